@@ -1,0 +1,36 @@
+"""Topology-preserving simplification of triangle surfaces."""
+
+from tetsimplify.errors import (
+    FileError,
+    MeshError,
+    MissingExtraError,
+    OptionError,
+    TetsimplifyError,
+    VolumeError,
+)
+from tetsimplify.isosurface import extract_isosurface
+from tetsimplify.mesh import Mesh
+from tetsimplify.repair import repair
+from tetsimplify.report import RepairReport, Simplification, SimplificationReport
+from tetsimplify.simplify import simplify
+from tetsimplify.topology import TopologyReport, topology
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "FileError",
+    "Mesh",
+    "MeshError",
+    "MissingExtraError",
+    "OptionError",
+    "RepairReport",
+    "Simplification",
+    "SimplificationReport",
+    "TetsimplifyError",
+    "TopologyReport",
+    "VolumeError",
+    "extract_isosurface",
+    "repair",
+    "simplify",
+    "topology",
+]

@@ -1,0 +1,386 @@
+"""The commands: isosurface, simplify, info and demo."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from tetsimplify import __version__
+from tetsimplify.cli import tables, values
+from tetsimplify.cli.session import Session, session
+from tetsimplify.edges import edge_lengths
+from tetsimplify.errors import FileError, MissingExtraError, OptionError, VolumeError
+from tetsimplify.io import (
+    MESH_FORMATS,
+    VOLUME_FORMATS,
+    Volume,
+    check_target,
+    is_mesh_file,
+    is_volume_file,
+    isosurface_of,
+    read_mesh,
+    read_volume,
+    write_mesh,
+)
+from tetsimplify.mesh import Mesh
+
+MESH_SUFFIXES = " ".join(MESH_FORMATS)
+VOLUME_SUFFIXES = " ".join(VOLUME_FORMATS)
+VOLUME_OPTIONS = "Volumes"
+
+app = typer.Typer(
+    name="tetsimplify",
+    help="Extract surfaces from voxel volumes and contract every short edge of triangle "
+    "meshes without ever changing their topology.",
+    epilog="Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+)
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, for programs.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+Output = Annotated[
+    Path,
+    typer.Option("--output", "-o", metavar="MESH", help=f"Mesh to write: {MESH_SUFFIXES}"),
+]
+Level = Annotated[float | None, typer.Option(help="Iso-value.", rich_help_panel=VOLUME_OPTIONS)]
+Closed = Annotated[
+    bool,
+    typer.Option("--closed", help="Cap the surface on the sides.", rich_help_panel=VOLUME_OPTIONS),
+]
+Lattice = Annotated[
+    str | None,
+    typer.Option(help="How cubes are cut into tetrahedra: kuhn.", rich_help_panel=VOLUME_OPTIONS),
+]
+Normals = Annotated[
+    str | None,
+    typer.Option(help="Point to lower or higher values.", rich_help_panel=VOLUME_OPTIONS),
+]
+Key = Annotated[
+    str | None,
+    typer.Option(help="Array to take from .npz or .vti.", rich_help_panel=VOLUME_OPTIONS),
+]
+Spacing = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A,B,C",
+        help="Distance between samples along the axes, instead of that in the file.",
+        rich_help_panel=VOLUME_OPTIONS,
+    ),
+]
+
+
+@app.command()
+def isosurface(
+    volume: Annotated[Path, typer.Argument(help=f"Volume to read: {VOLUME_SUFFIXES}")],
+    level: Annotated[float, typer.Option(help="Iso-value.")],
+    output: Output,
+    closed: Closed = False,
+    lattice: Lattice = None,
+    normals: Normals = None,
+    key: Key = None,
+    spacing: Spacing = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Extract the surface where a volume has the value --level, by marching tetrahedra."""
+    with session("isosurface", as_json=as_json, quiet=quiet, debug=debug) as this:
+        check_target(output)
+        options = {"lattice": lattice, "normals": normals, "closed": closed or None}
+        mesh = _extract(this, volume, level, key, spacing, options)
+        found = _topology(this, mesh)
+        _write(this, output, mesh)
+        this.finish(
+            {
+                **_header(this, volume),
+                "level": level,
+                "topology": tables.topology_as_dict(found),
+                "seconds": this.seconds,
+            },
+            tables.topology_table("Topology", isosurface=found),
+            tables.seconds_table(this.seconds),
+            _wrote(this),
+        )
+
+
+@app.command()
+def simplify(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MESH|VOLUME",
+            help=f"Mesh to read: {MESH_SUFFIXES}; or volume: {VOLUME_SUFFIXES}",
+        ),
+    ],
+    output: Output,
+    max_edge_length: Annotated[
+        str,
+        typer.Option(
+            metavar="LENGTH|PERCENT",
+            help="Contract shorter edges: a length in the units of the mesh, or a percentage "
+            "of the median edge length such as 120%.",
+        ),
+    ],
+    blocked: Annotated[
+        str | None,
+        typer.Option(help="Edges that the link condition blocks: contract, skip or violate."),
+    ] = None,
+    placement: Annotated[
+        str | None, typer.Option(help="Where the new vertex goes: midpoint or endpoint.")
+    ] = None,
+    outer: Annotated[
+        str | None,
+        typer.Option(
+            help="How to tell what is outside of nested 3-cycles: region, path or distance."
+        ),
+    ] = None,
+    removal_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH|Nx|inf",
+            help="How far from its edge a nested contraction may remove vertices: a length, "
+            "a multiple of the edge length such as 4x, or inf.",
+        ),
+    ] = None,
+    foldover: Annotated[
+        str | None,
+        typer.Option(metavar="DEGREES|off", help="Largest turn of a face in one contraction."),
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Make the mesh an oriented manifold first.")
+    ] = False,
+    level: Level = None,
+    closed: Closed = False,
+    lattice: Lattice = None,
+    normals: Normals = None,
+    key: Key = None,
+    spacing: Spacing = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Contract every edge shorter than --max-edge-length and keep the topology.
+
+    A volume is turned into the surface at --level first.
+    """
+    with session("simplify", as_json=as_json, quiet=quiet, debug=debug) as this:
+        check_target(output)
+        number, is_relative = values.parse_edge_length(max_edge_length)
+        options: dict[str, Any] = {"blocked": blocked, "placement": placement, "outer": outer}
+        options = {name: value for name, value in options.items() if value is not None}
+        if foldover is not None:
+            options["foldover"] = values.parse_foldover(foldover)
+        if removal_limit is not None:
+            values.parse_removal_limit(removal_limit, number)  # complain before any work
+
+        volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
+        mesh = _read(this, source, level, key, spacing, volume_options)
+        length = number
+        if is_relative:
+            lengths = edge_lengths(mesh)
+            length = number * float(np.median(lengths)) if len(lengths) else 0.0
+        if removal_limit is not None:
+            options["removal_limit"] = values.parse_removal_limit(removal_limit, length)
+
+        result = _simplify(this, mesh, max_edge_length=length, repair=repair, **options)
+        _write(this, output, Mesh(result.vertices, result.faces))
+        this.finish(
+            {
+                **_header(this, source),
+                **tables.simplification_as_dict(result.report),
+                "seconds": this.seconds,
+            },
+            *tables.simplification_tables(result.report, this.seconds),
+            tables.headline(result.report),
+            _wrote(this),
+        )
+
+
+@app.command()
+def info(
+    mesh: Annotated[Path, typer.Argument(help=f"Mesh to read: {MESH_SUFFIXES}")],
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Tell the topology of a mesh, its edge lengths, and what keeps it from being a manifold."""
+    with session("info", as_json=as_json, quiet=quiet, debug=debug) as this:
+        with this.stage("read"):
+            surface = read_mesh(mesh)
+        found = _topology(this, surface)
+        lengths = edge_lengths(surface)
+        defects = tables.defect_table(found)
+        this.finish(
+            {
+                **_header(this, mesh),
+                "topology": tables.topology_as_dict(found),
+                "edge_lengths": tables.lengths_as_dict(lengths),
+                "seconds": this.seconds,
+            },
+            tables.topology_table("Topology", mesh=found),
+            tables.lengths_table(lengths),
+            *([] if defects is None else [defects]),
+        )
+
+
+@app.command()
+def demo(
+    output_dir: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Where to write brain.ply and brain.png.")
+    ] = Path(),
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Do the main job on a real volume: the brain of an average MRI.
+
+    Extracts 925,212 triangles, contracts every edge shorter than 1.2 median edges, writes
+    the result and a picture of before and after.
+    """
+    with session("demo", as_json=as_json, quiet=quiet, debug=debug) as this:
+        from tetsimplify import demo as work
+
+        mesh_path, picture_path = output_dir / "brain.ply", output_dir / "brain.png"
+        check_target(mesh_path)
+        with this.stage("extract"):
+            before = work.extract_brain(this.progress)
+        length = work.MEDIAN_EDGES * float(np.median(edge_lengths(before)))
+        result = _simplify(this, before, max_edge_length=length)
+        after = Mesh(result.vertices, result.faces)
+        _write(this, mesh_path, after)
+        try:
+            with this.stage("draw"):
+                work.save_picture(picture_path, before, result)
+            this.written.append(picture_path)
+        except MissingExtraError as error:
+            this.note(f"no picture: {error}")
+        this.finish(
+            {
+                **_header(this, work.VOLUME),
+                "level": work.LEVEL,
+                **tables.simplification_as_dict(result.report),
+                "seconds": this.seconds,
+            },
+            f"Average brain MRI, 1 mm, at level {work.LEVEL}: edges shorter than "
+            f"{length:.4g} mm ({work.MEDIAN_EDGES} median edges) contracted",
+            "",
+            *tables.simplification_tables(result.report, this.seconds),
+            tables.headline(result.report),
+            _wrote(this),
+        )
+
+
+def _header(this: Session, source: Path | str) -> dict[str, Any]:
+    made = {"command": this.command, "version": __version__, "input": source}
+    return {**made, "outputs": this.written} if this.written else made
+
+
+def _wrote(this: Session) -> str:
+    return f"Wrote {' and '.join(map(str, this.written))}"
+
+
+def _read(
+    this: Session,
+    source: Path,
+    level: float | None,
+    key: str | None,
+    spacing: str | None,
+    options: dict[str, Any],
+) -> Mesh:
+    """Read a mesh, or extract one from a volume."""
+    if is_volume_file(source):
+        if level is None:
+            raise OptionError(f"{source} is a volume, so --level is needed")
+        return _extract(this, source, level, key, spacing, options)
+    if not is_mesh_file(source):
+        raise FileError(
+            f"{source} has no known suffix; meshes have {MESH_SUFFIXES}, volumes {VOLUME_SUFFIXES}"
+        )
+    given = {"level": level, "key": key, "spacing": spacing, **options}
+    if wrong := [f"--{name}" for name, value in given.items() if value is not None]:
+        raise OptionError(f"{', '.join(wrong)}: only for volumes, and {source} is a mesh")
+    with this.stage("read"):
+        return read_mesh(source)
+
+
+def _extract(
+    this: Session,
+    path: Path,
+    level: float,
+    key: str | None,
+    spacing: str | None,
+    options: dict[str, Any],
+) -> Mesh:
+    """Extract a surface from a volume, and explain when there is none."""
+    distances = None if spacing is None else values.parse_spacing(spacing)
+    with this.stage("read"):
+        volume: Volume = read_volume(path, key=key)
+    if distances is not None:
+        volume = volume.with_spacing(distances)
+    given = {name: value for name, value in options.items() if value is not None}
+    with this.stage("extract"):
+        mesh = isosurface_of(volume, level, progress=this.progress, **given)
+    if not len(mesh.faces):
+        low, high = volume.data.min(), volume.data.max()
+        raise VolumeError(
+            f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
+        )
+    return mesh
+
+
+def _simplify(this: Session, mesh: Mesh, **options: Any) -> Any:
+    from tetsimplify.simplify import simplify as contract
+
+    result = contract(*mesh, progress=this.progress, **options)
+    this.seconds.update(result.report.seconds)
+    return result
+
+
+def _topology(this: Session, mesh: Mesh) -> Any:
+    from tetsimplify.topology import topology
+
+    with this.stage("topology"):
+        return topology(*mesh)
+
+
+def _write(this: Session, path: Path, mesh: Mesh) -> None:
+    with this.stage("write"):
+        write_mesh(path, mesh)
+    this.written.append(path)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"tetsimplify {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _tetsimplify(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", is_eager=True, callback=_show_version),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line of the console script."""
+    # A polite request to end must not leave a temporary file behind either.
+    signal.signal(signal.SIGTERM, _end)
+    app()
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    sys.exit(128 + number)

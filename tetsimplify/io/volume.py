@@ -1,0 +1,102 @@
+"""A voxel volume that knows where in the world it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tetsimplify.arrays import as_triple
+from tetsimplify.errors import FileError
+
+
+class Volume(NamedTuple):
+    """Samples on a grid, and the affine transform from grid to world.
+
+    Attributes
+    ----------
+    data : ndarray, shape (n0, n1, n2), dtype and memory order of the file
+        Samples; a memory map where the format allows it.
+    affine : ndarray, shape (4, 4), float64
+        ``world = affine @ (index0, index1, index2, 1)``.
+    """
+
+    data: NDArray[Any]
+    affine: NDArray[np.float64]
+
+    @property
+    def spacing(self) -> tuple[float, float, float] | None:
+        """Distance between samples along the axes, where these are those of the world.
+
+        None where the affine transform also rotates, shears, swaps or mirrors axes.
+        """
+        diagonal = self.affine[:3, :3].diagonal()
+        if (diagonal <= 0).any() or (self.affine[:3, :3] != np.diag(diagonal)).any():
+            return None
+        return _as_tuple(diagonal)
+
+    @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """Position of sample (0, 0, 0), None where :attr:`spacing` is."""
+        return None if self.spacing is None else _as_tuple(self.affine[:3, 3])
+
+    def with_spacing(self, spacing: Sequence[float]) -> Volume:
+        """The same samples at other distances along the three axes; directions stay."""
+        lengths = np.linalg.norm(self.affine[:3, :3], axis=0)
+        affine = self.affine.copy()
+        affine[:3, :3] *= as_triple("spacing", spacing, positive=True) / lengths
+        return Volume(self.data, affine)
+
+
+def _as_tuple(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    a, b, c = values.tolist()
+    return a, b, c
+
+
+def affine_of(
+    spacing: ArrayLike = 1.0, origin: ArrayLike = 0.0, directions: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Build an affine transform.
+
+    Parameters
+    ----------
+    spacing : array_like, shape (3,)
+        Distance between samples along each axis.
+    origin : array_like, shape (3,)
+        Position of sample (0, 0, 0).
+    directions : array_like, shape (3, 3), optional
+        The direction of each axis in the world as a column; the axes of the world if not
+        given.
+
+    Returns
+    -------
+    ndarray, shape (4, 4), float64
+    """
+    affine = np.eye(4)
+    columns = np.eye(3) if directions is None else np.asarray(directions, np.float64)
+    affine[:3, :3] = columns * np.asarray(spacing, np.float64)
+    affine[:3, 3] = origin
+    return affine
+
+
+def checked_volume(data: Any, affine: NDArray[np.float64], axes: str | None = None) -> Volume:
+    """Drop axes of length 1 beyond the third and refuse what is no volume of real numbers.
+
+    Raises
+    ------
+    FileError
+        When the array has not three axes or holds no real numbers, or when the transform is
+        singular.
+    """
+    while data.ndim > 3 and data.shape[-1] == 1:
+        data = data[..., 0]
+    if data.ndim != 3:
+        named = f" ({axes})" if axes else ""
+        raise FileError(f"its array has shape {data.shape}{named}, but a volume has three axes")
+    if data.dtype.kind not in "biuf":
+        raise FileError(f"its array holds {data.dtype}, but a volume holds real numbers")
+    if not np.isfinite(affine).all() or np.linalg.det(affine[:3, :3]) == 0:
+        raise FileError(f"its transform to the world cannot be inverted: {affine.tolist()}")
+    return Volume(data, affine)

@@ -1,0 +1,120 @@
+"""Contraction of one edge, as in section 5 of Pepko and Borisenko (2023).
+
+Both ways tell what became of the edge. With `commit` False nothing is changed. The faces around
+the new vertex get the state `colour`.
+"""
+
+from tetsimplify.kernels.corners import DEAD, ahead
+from tetsimplify.kernels.jit import inlined, part
+from tetsimplify.kernels.lens import keep_one_lens
+from tetsimplify.kernels.link import gather_stars, link_condition
+from tetsimplify.kernels.placement import find_place
+from tetsimplify.kernels.state import (
+    CONTRACTIBLE,
+    DOOMED,
+    FOLDOVER,
+    FOLLOWER,
+    LOCKED,
+    N_LENS_FACES,
+    N_LENS_VERTICES,
+    N_LENSES,
+    N_LIVE,
+    N_NESTED,
+    N_SIMPLE,
+    PLACE,
+    SETTLED,
+    STAR_U,
+    STAR_V,
+    VIOLATE,
+)
+
+
+@part
+def contract_simple(surface, scratch, rules, corner, colour):
+    """Contract the edge that begins at `corner` if the link condition allows it.
+
+    NESTED when it does not; with ``blocked="violate"`` it does not matter.
+    """
+    v = surface.corner_vertex[corner]
+    u = surface.corner_vertex[ahead(corner)]
+    if surface.locked[v] and surface.locked[u]:
+        return LOCKED
+    n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)
+    if rules.blocked != VIOLATE:
+        allowed = link_condition(
+            surface.loop, surface.loop_size, v, u, n_v, n_u, n_doomed, n_common
+        )
+        if allowed != CONTRACTIBLE:
+            return allowed
+    if not find_place(surface, scratch, rules, v, u, n_v, n_u):
+        return FOLDOVER
+    loop = max(surface.loop[v], surface.loop[u])
+    if n_doomed == 1 and loop >= 0:
+        surface.loop_size[loop] -= 1
+    _merge(surface, scratch, v, u, n_v, n_u, n_doomed, colour)
+    scratch.tally[N_SIMPLE] += 1
+    return CONTRACTIBLE
+
+
+@inlined
+def contract_nested(surface, scratch, rules, outer, corner, colour, commit):
+    """Contract the edge that begins at `corner` and remove the lenses beside the kept one.
+
+    Where the link condition allows the contraction there is but one lens, which is kept.
+    """
+    v = surface.corner_vertex[corner]
+    u = surface.corner_vertex[ahead(corner)]
+    if surface.locked[v] and surface.locked[u]:
+        return LOCKED
+    lens = keep_one_lens(surface, scratch, rules, outer, corner)
+    if lens.outcome != CONTRACTIBLE:
+        return lens.outcome
+    if not find_place(surface, scratch, rules, v, u, lens.n_v, lens.n_u):
+        return FOLDOVER
+    if not commit:
+        return CONTRACTIBLE
+    if lens.loop_size > 0:
+        surface.loop_size[surface.loop[v]] = lens.loop_size
+    vertex = lens.first_removed
+    while vertex >= 0:
+        surface.merged_into[vertex] = -1
+        vertex = scratch.nodes[FOLLOWER, vertex]
+    _merge(surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
+    if scratch.tally[N_LENSES] > 1:
+        scratch.tally[N_NESTED] += 1
+        scratch.tally[N_LENS_VERTICES] += lens.n_removed
+        scratch.tally[N_LENS_FACES] += lens.n_doomed
+    else:
+        scratch.tally[N_SIMPLE] += 1
+    return CONTRACTIBLE
+
+
+@part
+def _merge(surface, scratch, v, u, n_v, n_u, n_doomed, colour):
+    """Bury the doomed faces and make one vertex, v, of v and u: move it, link its corners."""
+    corner_vertex, lists = surface.corner_vertex, scratch.lists
+    for i in range(n_doomed):
+        f = lists[DOOMED, i]
+        surface.face_state[f] = SETTLED
+        for k in range(3):
+            corner_vertex[3 * f + k] = DEAD
+    scratch.tally[N_LIVE] -= n_doomed
+
+    for axis in range(3):
+        surface.vertices[v, axis] = scratch.point[axis]
+    surface.merged_into[u] = v
+    n_merges = scratch.tally[N_SIMPLE] + scratch.tally[N_NESTED]
+    surface.merges[n_merges, 0] = u
+    surface.merges[n_merges, 1] = scratch.point[PLACE]
+    surface.locked[v] |= surface.locked[u]
+    surface.loop[v] = max(surface.loop[v], surface.loop[u])
+
+    star = lists[STAR_V]
+    for i in range(n_u):
+        c = lists[STAR_U, i]
+        corner_vertex[c] = v
+        star[n_v + i] = c
+    n = n_v + n_u
+    for i in range(n):
+        surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
+        surface.face_state[star[i] // 3] = colour

@@ -1,0 +1,100 @@
+r"""The link condition (Dey, Edelsbrunner, Guha and Nekhayev 1999), boundaries coned.
+
+An edge vu with the faces vua and vub may be contracted as it is when its ends have no common
+neighbours but a and b, and the links of v and u share no edge (which only happens in a
+tetrahedron, or with the cone in a single triangle):
+
+              a                  A boundary loop counts as joined to one virtual vertex.
+            / | \                So a boundary edge has it as second apex, and two boundary
+           v--+--u               vertices on one loop have it as a common neighbour.
+            \ | /
+              b
+"""
+
+from tetsimplify.kernels.corners import DEAD, ahead, behind
+from tetsimplify.kernels.jit import part
+from tetsimplify.kernels.state import (
+    CONTRACTIBLE,
+    DOOMED,
+    NESTED,
+    OBSTRUCTED,
+    STAMP,
+    STAR_U,
+    STAR_V,
+)
+
+
+@part
+def gather_stars(surface, scratch, corner):
+    """Collect the stars of the ends v, u of the edge that begins at `corner`.
+
+    The corners that survive a simple contraction go to `star_v` and `star_u`, the faces that
+    it removes to `doomed`.
+
+    Returns
+    -------
+    n_v, n_u, n_doomed : int
+        How many there are of each.
+    n_common : int
+        Number of real common neighbours of v and u.
+    """
+    corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
+    star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
+    doomed = scratch.lists[DOOMED]
+    v = corner_vertex[corner]
+    u = corner_vertex[ahead(corner)]
+    stamp = scratch.tally[STAMP] + 2
+    scratch.tally[STAMP] = stamp
+
+    n_v = 0
+    n_doomed = 0
+    c = corner
+    while True:
+        n = corner_vertex[ahead(c)]
+        p = corner_vertex[behind(c)]
+        if n != DEAD:
+            mark[n] = stamp
+            mark[p] = stamp
+            if n == u or p == u:
+                doomed[n_doomed] = c // 3
+                n_doomed += 1
+            else:
+                star_v[n_v] = c
+                n_v += 1
+        c = next_corner[c]
+        if c == corner:
+            break
+
+    n_u = 0
+    n_common = 0
+    start = ahead(corner)
+    c = start
+    while True:
+        n = corner_vertex[ahead(c)]
+        p = corner_vertex[behind(c)]
+        if n != DEAD:
+            if mark[n] == stamp:
+                mark[n] = stamp - 1
+                n_common += 1
+            if mark[p] == stamp:
+                mark[p] = stamp - 1
+                n_common += 1
+            if n != v and p != v:
+                star_u[n_u] = c
+                n_u += 1
+        c = next_corner[c]
+        if c == start:
+            break
+    return n_v, n_u, n_doomed, n_common
+
+
+@part
+def link_condition(loop, loop_size, v, u, n_v, n_u, n_doomed, n_common):
+    """Whether a simple contraction is allowed: CONTRACTIBLE, NESTED or OBSTRUCTED."""
+    loop_v, loop_u = loop[v], loop[u]
+    if n_doomed == 1:  # a boundary edge
+        return CONTRACTIBLE if n_common == 1 and loop_size[loop_v] > 3 else NESTED
+    if loop_v >= 0 and loop_u >= 0:  # two loops would be pinched together
+        return NESTED if loop_v == loop_u else OBSTRUCTED
+    is_tetrahedron = n_v == 1 and n_u == 1 and loop_v < 0 and loop_u < 0
+    return CONTRACTIBLE if n_common == 2 and not is_tetrahedron else NESTED

@@ -1,0 +1,97 @@
+"""What is left in the end: live faces, and what became of every vertex."""
+
+import numpy as np
+
+from tetsimplify.kernels.corners import DEAD
+from tetsimplify.kernels.cost import squared_length
+from tetsimplify.kernels.jit import kernel, kernel_in_place
+
+
+@kernel_in_place
+def copy_live_faces(corner_vertex, state, verdict, origin, to_corner, to_state, to_verdict, to):
+    """Copy the live faces with their states, verdicts and origins, in order."""
+    n = 0
+    for f in range(state.size):
+        if corner_vertex[3 * f] == DEAD:
+            continue
+        for k in range(3):
+            to_corner[3 * n + k] = corner_vertex[3 * f + k]
+            to_verdict[3 * n + k] = verdict[3 * f + k]
+        to_state[n] = state[f]
+        to[n] = origin[f]
+        n += 1
+
+
+@kernel_in_place
+def number_vertices(corner_vertex, merged_into, number):
+    """Number the vertices that faces use, in order, and tell every vertex its number.
+
+    Parameters
+    ----------
+    merged_into : int32 (n,)
+        Vertex that each one was merged into, itself where it was not, -1 where removed.
+    number : int32 (n,), out
+        New number of each vertex, or of what it was merged into; -1 where that is gone.
+
+    Returns
+    -------
+    int
+        Number of vertices in use.
+    """
+    for v in range(number.size):
+        number[v] = -1
+    for corner in range(corner_vertex.size):
+        number[corner_vertex[corner]] = 0
+    n = 0
+    for v in range(number.size):
+        if number[v] == 0:
+            number[v] = n
+            n += 1
+    for v in range(number.size):
+        root = v
+        while merged_into[root] >= 0 and merged_into[root] != root:
+            root = merged_into[root]
+        target = root if merged_into[root] >= 0 else -1
+        w = v
+        while w != root:  # shorten the path for those who come later
+            following = merged_into[w]
+            merged_into[w] = target
+            w = following
+        number[v] = number[root] if target >= 0 else -1
+    return n
+
+
+@kernel_in_place
+def copy_vertices(vertices, number, merged_into, corner_vertex, out):
+    """Copy the vertices that are in use to their new places and renumber the corners."""
+    for v in range(number.size):
+        if merged_into[v] == v and number[v] >= 0:
+            for axis in range(3):
+                out[number[v], axis] = vertices[v, axis]
+    for corner in range(corner_vertex.size):
+        corner_vertex[corner] = number[corner_vertex[corner]]
+
+
+@kernel
+def count_loop_edges(loop, n_loops):
+    """Number of edges, which is that of vertices, of every boundary loop."""
+    size = np.zeros(max(1, n_loops), np.int32)
+    for v in range(loop.size):
+        if loop[v] >= 0:
+            size[loop[v]] += 1
+    return size
+
+
+@kernel_in_place
+def shortest_edge(vertices, corner_vertex):
+    """Length of the shortest edge, infinite when there is none."""
+    shortest2 = np.inf
+    for f in range(corner_vertex.size // 3):
+        a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
+        shortest2 = min(
+            shortest2,
+            squared_length(vertices, a, b),
+            squared_length(vertices, b, c),
+            squared_length(vertices, c, a),
+        )
+    return np.sqrt(shortest2)

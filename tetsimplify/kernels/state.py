@@ -1,0 +1,89 @@
+"""What the contraction kernels work on: the surface, the rules and the scratch space.
+
+Arrays are bundled in few, because every array that a kernel is given has to be compiled in.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+# States of a face. A sweep passes over settled faces, and over the faces that it has touched
+# itself: these carry its own colour and are its freeze; the next sweep has the other colour.
+SETTLED, BLOCKED, STALE_EVEN, STALE_ODD = 0, 1, 2, 3
+
+# What becomes of an edge that is to be contracted. NESTED: the link condition blocks it.
+CONTRACTIBLE, OBSTRUCTED, REMOVAL_LIMIT, FOLDOVER, LOCKED, NESTED = 0, 1, 2, 3, 4, 5
+OUTCOMES = ("contractible", "obstructed", "removal_limit", "foldover", "locked", "skipped")
+
+# What to do with an edge that the link condition blocks.
+CONTRACT, SKIP, VIOLATE = 0, 1, 2
+
+# How to tell the outer triangles of a nested edge, where not by region growing.
+PATH, DISTANCE = 0, 1
+
+
+class Surface(NamedTuple):
+    """The mesh while it is being contracted: a corner table and what goes with it."""
+
+    vertices: np.ndarray  # float64 (n, 3): positions
+    corner_vertex: np.ndarray  # int32 (3 m,): vertex of each corner, DEAD of a dead face
+    next_corner: np.ndarray  # int32 (3 m,): circular lists of the corners of each vertex
+    face_state: np.ndarray  # uint8 (m,)
+    verdict: np.ndarray  # uint8 (3 m,): outcome for the edge from each corner, when last tried
+    merged_into: np.ndarray  # int32 (n,): vertex that this one was merged into, -1 when removed
+    loop: np.ndarray  # int32 (n,): boundary loop of the vertex, -1 inside
+    loop_size: np.ndarray  # int32 (n_loops,): edges of each boundary loop
+    locked: np.ndarray  # bool (n,): the vertex may neither move nor vanish
+    merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
+
+
+class Rules(NamedTuple):
+    """The policies of a run."""
+
+    max_length2: float  # edges shorter than the root of this are contracted
+    blocked: int  # CONTRACT, SKIP or VIOLATE
+    removal_limit2: float  # how far from the edge vertices may be removed, squared
+    cos_foldover: float  # smallest cosine between the normals of a face before and after
+    places: np.ndarray  # float64 (k,): placements to try, as parameters along the edge
+    max_steps: int  # steps of region growing after which `removal_limit` is the answer
+
+
+class Scratch(NamedTuple):
+    """Working memory. Virtual vertices, which cone the boundary loops, follow the real ones.
+
+    Arrays are as long as they could ever need to be; what is not touched costs nothing.
+    """
+
+    tally: np.ndarray  # int64: counters, below
+    mark: np.ndarray  # int32 (n + n_loops,): stamps of vertices
+    face_mark: np.ndarray  # int32 (m,): stamps of faces
+    nodes: np.ndarray  # int32 (3, n + n_loops): what is known of vertices for a while, below
+    lists: np.ndarray  # int32 (N_LISTS, m + 2): lists, below
+    point: np.ndarray  # float64 (4,): middle of the edge, then the new vertex and its PLACE
+
+
+# Places in `Scratch.tally`: what has been done, and what is at hand.
+N_SIMPLE, N_NESTED, N_LENS_VERTICES, N_LENS_FACES, N_LIVE = 0, 1, 2, 3, 4
+STAMP, N_STEPS, N_DEFERRED = 5, 6, 7  # last stamp given, steps of region growing, faces put off
+LENS_STAMP, N_LENSES, CONE = 8, 9, 10  # of the lenses at hand, see lens.py
+TALLY_SIZE = 11
+
+PLACE = 3  # in `Scratch.point`: parameter of the new vertex along its edge
+
+# Rows of `Scratch.nodes`.
+SLOT = 0  # sparse set: place of a vertex in some list
+FOLLOWER = 1  # next vertex in a linked list
+ENTRY = 2  # a corner of the vertex
+
+# Rows of `Scratch.lists`.
+STAR_V, STAR_U = 0, 1  # corners of the two ends that survive the contraction
+DOOMED = 2  # faces that the contraction removes
+LINK_V, LINK_U = 3, 4  # links of the two ends in order
+FAN_V, FAN_U = 5, 6  # corners of the two ends in order
+CUT_V, CUT_U = 7, 8  # places of the common neighbours in the links
+FIRST, LAST, CURSOR = 9, 10, 11  # inner vertices of each lens: list, and the last one visited
+N_VERTICES, N_FACES = 12, 13  # numbers of inner vertices and faces of each lens
+STATUS = 14  # of each lens
+VOTES, LENGTHS_A, LENGTHS_B = 15, 16, 17  # of the common neighbours, see outer.py
+DEFERRED = 18  # faces with a blocked edge, put off to the end of the sweep
+N_LISTS = 19

@@ -1,0 +1,112 @@
+"""Sweeps over the faces in memory order: pick the cheapest edge, test, contract, freeze.
+
+A sweep does the simple contractions and puts off the faces where the link condition blocks an
+edge; `unblock` follows and does the nested contractions there.
+"""
+
+from tetsimplify.kernels.contraction import contract_nested, contract_simple
+from tetsimplify.kernels.corners import DEAD
+from tetsimplify.kernels.cost import cheapest_first, edge_costs
+from tetsimplify.kernels.jit import kernel_in_place
+from tetsimplify.kernels.state import (
+    BLOCKED,
+    CONTRACTIBLE,
+    DEFERRED,
+    N_DEFERRED,
+    NESTED,
+    OBSTRUCTED,
+    REMOVAL_LIMIT,
+    SETTLED,
+)
+
+
+@kernel_in_place
+def sweep(surface, scratch, rules, first, last, colour, retry):
+    """Contract at most one short edge of each of the faces from `first` to `last`.
+
+    Parameters
+    ----------
+    colour : int
+        State that faces get when they are touched; STALE_EVEN and STALE_ODD in turn.
+    retry : bool
+        Try faces again all of whose short edges were refused before.
+
+    Returns
+    -------
+    int
+        Number of contractions.
+    """
+    n_contracted = 0
+    for f in range(first, last):
+        state = surface.face_state[f]
+        if state == SETTLED or state == colour or (state == BLOCKED and not retry):
+            continue
+        costs = edge_costs(surface.vertices, surface.corner_vertex, f)
+        order = cheapest_first(costs)
+        if costs[order[0]] >= rules.max_length2:
+            surface.face_state[f] = SETTLED
+            continue
+        surface.face_state[f] = BLOCKED
+        is_nested = False
+        for k in order:
+            if costs[k] >= rules.max_length2:
+                break
+            outcome = contract_simple(surface, scratch, rules, 3 * f + k, colour)
+            if outcome == CONTRACTIBLE:
+                n_contracted += 1
+                is_nested = False
+                break
+            surface.verdict[3 * f + k] = outcome
+            is_nested |= outcome == NESTED
+        if is_nested:
+            scratch.lists[DEFERRED, scratch.tally[N_DEFERRED]] = f
+            scratch.tally[N_DEFERRED] += 1
+    return n_contracted
+
+
+@kernel_in_place
+def unblock(surface, scratch, rules, outer, colour):
+    """Contract at most one blocked edge of each of the faces put off.
+
+    Parameters
+    ----------
+    outer : None or int
+        How to tell which lens to keep: None by region growing, else PATH or DISTANCE.
+    colour : int
+        As of :func:`sweep`; faces that were touched in the same sweep are left.
+
+    Returns
+    -------
+    int
+        Number of contractions.
+    """
+    n_contracted = 0
+    for i in range(scratch.tally[N_DEFERRED]):
+        f = scratch.lists[DEFERRED, i]
+        if surface.corner_vertex[3 * f] == DEAD or surface.face_state[f] == colour:
+            continue
+        costs = edge_costs(surface.vertices, surface.corner_vertex, f)
+        for k in cheapest_first(costs):
+            corner = 3 * f + k
+            if costs[k] >= rules.max_length2:
+                break
+            if surface.verdict[corner] != NESTED:
+                continue
+            outcome = contract_nested(surface, scratch, rules, outer, corner, colour, True)
+            if outcome == CONTRACTIBLE:
+                n_contracted += 1
+                break
+            surface.verdict[corner] = outcome
+    scratch.tally[N_DEFERRED] = 0
+    return n_contracted
+
+
+@kernel_in_place
+def find_obstructed(surface, scratch, rules, outer):
+    """Find out which of the edges that the removal limit holds are obstructed under `rules`."""
+    for corner in range(surface.verdict.size):
+        is_open = surface.face_state[corner // 3] != SETTLED
+        if is_open and surface.verdict[corner] == REMOVAL_LIMIT:
+            outcome = contract_nested(surface, scratch, rules, outer, corner, SETTLED, False)
+            if outcome == OBSTRUCTED:
+                surface.verdict[corner] = OBSTRUCTED

@@ -1,0 +1,187 @@
+"""Topology-preserving simplification by edge contraction (Pepko and Borisenko 2023)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tetsimplify import kernels
+from tetsimplify.arrays import as_data, as_mesh, as_vertex_mask
+from tetsimplify.engine import Engine
+from tetsimplify.mesh import Mesh
+from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
+from tetsimplify.repair import repair as repair_mesh
+from tetsimplify.report import Simplification, SimplificationReport
+from tetsimplify.topology import topology
+
+
+def simplify(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    max_edge_length: float,
+    blocked: str = "contract",
+    placement: str = "midpoint",
+    removal_limit: float | None = None,
+    outer: str = "region",
+    foldover: float | None = DEFAULT_FOLDOVER,
+    locked: ArrayLike | None = None,
+    repair: bool = False,
+    vertex_data: Mapping[str, ArrayLike] | None = None,
+    face_data: Mapping[str, ArrayLike] | None = None,
+    progress: Progress | None = None,
+) -> Simplification:
+    """Contract every edge shorter than `max_edge_length` without changing the topology.
+
+    Where the ends of an edge have more common neighbours than the apexes of its two faces,
+    the inside of the nested 3-cycles is removed with the edge.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3)
+        Positions, finite.
+    faces : array_like, shape (m, 3), integers
+        A consistently oriented 2-manifold, with or without boundary, of any genus and any
+        number of components.
+    max_edge_length : float
+        Shorter edges are contracted; in the units of the vertices.
+    blocked : {"contract", "skip", "violate"}
+        What to do with an edge that the link condition blocks: contract it with the inside of
+        its nested 3-cycles; leave it, as other programs do; or contract it and break the
+        topology, the "standard" algorithm of the paper, which shows what goes wrong.
+    placement : {"midpoint", "endpoint"}
+        Where the new vertex goes. Boundary vertices stay on the boundary either way. With
+        "endpoint" all vertices of the result are vertices of the input.
+    removal_limit : float, optional
+        How far from the middle of its edge a nested contraction may remove vertices; in the
+        units of the vertices. None is 4 times `max_edge_length`; ``inf`` is the paper's
+        behaviour, which may remove a balloon on a thin neck.
+    outer : {"region", "path", "distance"}
+        How to tell what is outside of nested 3-cycles: by the number of vertices (growing
+        regions in step), by the shortest paths along edges, by the Euclidean distance. The
+        topology is kept with each of them; only the first is fast.
+    foldover : float, optional
+        Largest change of a face normal in one contraction, in degrees. Other places along the
+        edge are tried before it is left. None is no limit.
+    locked : array_like, optional
+        Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
+    repair : bool
+        Repair a mesh that is no oriented 2-manifold first; see :func:`tetsimplify.repair`.
+    vertex_data, face_data : mapping of names to arrays, optional
+        Shapes (n, ...) and (m, ...). Floats at vertices are interpolated along contracted edges
+        as the positions are, so linear functions of the position stay exact; all other types
+        are labels, taken from the nearer end of the edge and never averaged.
+    progress : callable, optional
+        Called as ``progress(stage, done)`` with `done` from 0 to 1. Raise from it to cancel.
+
+    Returns
+    -------
+    Simplification
+        `vertices`, `faces`, `vertex_map` (old to new), `face_map` (new to old), `report`,
+        `vertex_data`, `face_data`.
+
+    Raises
+    ------
+    MeshError
+        When the mesh is no consistently oriented 2-manifold, or not a mesh at all. The message
+        says what is wrong where.
+    OptionError
+        When an option has a wrong value.
+
+    Notes
+    -----
+    Topology is kept exactly when the kept side is bounded by one 4-cycle and all that is
+    removed is a disc; see the page on theory. Every short edge that is left is listed in
+    ``report.remaining_edges`` with its reason. With ``foldover=None, removal_limit=inf`` only
+    edges remain whose contraction is proven impossible.
+
+    References
+    ----------
+    Ya. S. Pepko and V. V. Borisenko. Topology-preserving triangulation simplification
+    algorithm by edge contraction. Fundamentalnaya i prikladnaya matematika 24(3), 2023,
+    153-169.
+
+    T. K. Dey, H. Edelsbrunner, S. Guha and D. V. Nekhayev. Topology preserving edge
+    contraction. Publ. Inst. Math. (Beograd) 66(80), 1999, 23-45.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tetsimplify
+    >>> x, y, z = np.mgrid[-1:1:40j, -1:1:40j, -1:1:40j]
+    >>> tube = 0.3 - np.hypot(np.hypot(x, y) - 0.6, z)
+    >>> mesh = tetsimplify.extract_isosurface(tube, 0.0)
+    >>> result = tetsimplify.simplify(*mesh, max_edge_length=1.0)
+    >>> result.report.topology_after.same_topology(result.report.topology_before)
+    True
+    """
+    clock = _Clock()
+    options = Options(max_edge_length, blocked, placement, removal_limit, outer, foldover)
+    with clock.stage("check"):
+        given = as_mesh(vertices, faces)
+        held = as_vertex_mask("locked", locked, len(given.vertices))
+        of_vertices = as_data("vertex_data", vertex_data, len(given.vertices))
+        of_faces = as_data("face_data", face_data, len(given.faces))
+        repaired = repair_mesh(*given) if repair else None
+        if repaired is not None:
+            held = held[repaired.vertex_origin]
+            of_vertices = {k: data[repaired.vertex_origin] for k, data in of_vertices.items()}
+            given = Mesh(repaired.vertices, repaired.faces)
+        engine = Engine(given, options, held)
+        shortest_before = kernels.result.shortest_edge(given.vertices, given.faces.reshape(-1))
+
+    with clock.stage("contract"):
+        engine.run(progress)
+
+    with clock.stage("report"):
+        weights = engine.vertex_weights() if of_vertices else None
+        result = engine.result()
+        vertex_map, face_map = result.vertex_map, result.face_map
+        if repaired is not None:
+            vertex_map = np.append(vertex_map, np.int32(-1))[repaired.vertex_map]
+            face_map = repaired.face_map[face_map]
+        after = topology(result.vertices, result.faces)
+        shortest_after = kernels.result.shortest_edge(result.vertices, result.faces.reshape(-1))
+
+    report = SimplificationReport(
+        options=options,
+        n_simple=engine.tally("N_SIMPLE"),
+        n_nested=engine.tally("N_NESTED"),
+        n_lens_vertices=engine.tally("N_LENS_VERTICES"),
+        n_lens_faces=engine.tally("N_LENS_FACES"),
+        n_sweeps=engine.n_sweeps,
+        seconds=clock.seconds,
+        topology_before=engine.topology_before,
+        topology_after=after,
+        shortest_edge_before=float(shortest_before),
+        shortest_edge_after=float(shortest_after),
+        remaining_edges=result.remaining_edges,
+        remaining_reasons=result.remaining_reasons,
+        repairs=None if repaired is None else repaired.report,
+    )
+    return Simplification(
+        result.vertices,
+        result.faces,
+        vertex_map,
+        face_map,
+        report,
+        {} if weights is None else weights.carry(of_vertices, result.vertex_map),
+        {name: data[face_map] for name, data in of_faces.items()},
+    )
+
+
+class _Clock:
+    """Adds up the seconds of named stages."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        begin = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - begin
