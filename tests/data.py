@@ -9,11 +9,9 @@ import pytest
 
 
 def data_dir() -> Path | None:
-    """The folder named by TETSIMPLIFY_DATA, else ``../shared/data`` beside the checkout."""
-    if named := os.environ.get("TETSIMPLIFY_DATA"):
-        return Path(named)
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    return beside if beside.is_dir() else None
+    """The folder named by TETSIMPLIFY_DATA, None where it is not set."""
+    named = os.environ.get("TETSIMPLIFY_DATA")
+    return Path(named) if named else None
 
 
 needs_data = pytest.mark.skipif(

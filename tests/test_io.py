@@ -9,9 +9,9 @@ import sys
 
 import numpy as np
 import pytest
+
 from data import data_dir, needs_data
 from io_meshes import POINTS, TRIANGLES, assert_same, nasty_mesh, sphere
-
 from tetsimplify.errors import FileError, MeshError, MissingExtraError
 from tetsimplify.io import MESH_FORMATS, check_target, files, read_mesh, write_mesh
 from tetsimplify.mesh import Mesh

@@ -7,9 +7,9 @@ import struct
 
 import numpy as np
 import pytest
+
 from io_meshes import FANNED, POINTS, POLYGONS, TRIANGLES, assert_same, nasty_mesh, sphere
 from ply_files import ENCODINGS, PlyFile, list_of
-
 from tetsimplify.errors import FileError
 from tetsimplify.io import read_mesh, stl, write_mesh
 from tetsimplify.mesh import Mesh

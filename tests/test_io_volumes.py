@@ -6,8 +6,8 @@ import builtins
 
 import numpy as np
 import pytest
-from data import data_dir, needs_data
 
+from data import data_dir, needs_data
 from tetsimplify.errors import FileError, MissingExtraError, OptionError, VolumeError
 from tetsimplify.io import Volume, isosurface_of, read_volume
 from tetsimplify.io.volume import affine_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from io_meshes import sphere
 
+from io_meshes import sphere
 from tetsimplify.errors import MissingExtraError
 from tetsimplify.mesh import Mesh
 from tetsimplify.picture import Lens, Side, save_side_by_side

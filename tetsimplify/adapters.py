@@ -19,7 +19,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from numpy.typing import NDArray
 
 from tetsimplify.errors import MeshError, MissingExtraError, OptionError
 
@@ -31,6 +33,19 @@ GROUP = "tetsimplify.adapters"
 
 class UnknownMeshTypeError(MeshError, TypeError):
     """No installed adapter knows the object given as a mesh."""
+
+
+class MeshArrays(NamedTuple):
+    """A mesh object as arrays: what ``from_...`` of an adapter returns and ``to_...`` takes."""
+
+    vertices: NDArray[Any]
+    """Shape (n, 3)."""
+    faces: NDArray[Any]
+    """Shape (m, 3)."""
+    vertex_data: dict[str, NDArray[Any]]
+    """Shapes (n, ...)."""
+    face_data: dict[str, NDArray[Any]]
+    """Shapes (m, ...)."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 FACES_AT_ONCE = 2**20  # between two calls of `progress`
 MARK_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-DECISION_STEPS = 8  # steps of region growing per face to tell obstructed from too large
+DECISION_STEPS = (100_000, 2)  # steps of region growing to tell obstructed from too large:
+# so many, and so many for each face
 
 
 class Result(NamedTuple):
@@ -94,10 +95,12 @@ class Engine:
         while True:
             n_contracted = self.sweep(retry, progress)
             if n_contracted == 0 and retry:
-                return
-            retry = n_contracted * FULL_SWEEP < self.n_faces
+                break
+            retry = n_contracted * FULL_SWEEP <= self.n_faces
             if 2 * self.n_faces < len(self._face_origin):
                 self._compact()
+        if progress is not None:
+            progress("contract", 1.0)
 
     def sweep(self, retry: bool = True, progress: Progress | None = None) -> int:
         """Sweep once over all faces; return the number of contractions.
@@ -173,7 +176,7 @@ class Engine:
         """Try the edges that the removal limit holds without it, as far as steps allow."""
         rules = self.rules._replace(
             removal_limit2=np.inf,
-            max_steps=self.tally("N_STEPS") + DECISION_STEPS * self.n_faces,
+            max_steps=self.tally("N_STEPS") + DECISION_STEPS[0] + DECISION_STEPS[1] * self.n_faces,
         )
         kernels.sweep.find_obstructed(self._surface, self._scratch, rules, self._outer)
 

@@ -17,6 +17,7 @@ from tetsimplify.mesh import Mesh
 Progress = Callable[[str, float], object]
 
 BYTES_READ_AT_ONCE = 2**24  # of float64 samples; a few planes of a volume in any memory order
+GROWTH = 1.25  # of the arrays of the result: at most a quarter of them is to spare
 
 
 def extract_isosurface(
@@ -93,8 +94,8 @@ def extract_isosurface(
     samples = as_volume(volume)
     tables = lattice_tables(lattice)
     frame = (as_triple("spacing", spacing, positive=True), as_triple("origin", origin))
-    if not np.isfinite(level):
-        raise OptionError(f"level must be a finite number, got {level}")
+    if np.shape(level) or np.asarray(level).dtype.kind not in "biuf" or not np.isfinite(level):
+        raise OptionError(f"level must be a finite number, got {level!r}")
     if normals not in ("lower", "higher"):
         raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
 
@@ -119,14 +120,44 @@ def _planes(volume: Any, level: float, above: bool) -> Iterator[_Plane]:
     at_once = max(1, BYTES_READ_AT_ONCE // bytes_of_plane)
     for begin in range(0, volume.shape[0], at_once):
         block = np.ascontiguousarray(volume[begin : begin + at_once])
-        if block.dtype.kind == "f" and not np.isfinite(block).all():
+        is_float = block.dtype.kind == "f"
+        with np.errstate(over="ignore"):  # of types wider than float64
+            block = block.astype(np.float64, copy=False)
+        if is_float and not np.isfinite(block).all():
             index = np.argwhere(~np.isfinite(block))[0] + (begin, 0, 0)
             raise VolumeError(
                 f"volume must be finite, got {volume[tuple(index)]} at index {index.tolist()}"
             )
-        block = block.astype(np.float64, copy=False)
         inside = block > level if above else block < level
         yield from (_Plane(*pair) for pair in zip(block, inside, strict=True))
+
+
+class _Rows:
+    """Rows of three that are added to, in an array that grows in place.
+
+    Where the system can map a large block of memory elsewhere nothing is copied, and nothing is
+    ever there twice.
+    """
+
+    def __init__(self, dtype: type) -> None:
+        self._rows: NDArray[Any] = np.empty((0, 3), dtype)
+        self.n_rows = 0
+
+    def add(self, n_rows: int) -> NDArray[Any]:
+        """A view of new rows, to be filled before more are added."""
+        begin = self.n_rows
+        self.n_rows += n_rows
+        if self.n_rows > len(self._rows):
+            self._resize(max(self.n_rows, int(GROWTH * len(self._rows))))
+        return self._rows[begin : self.n_rows]
+
+    def finish(self) -> NDArray[Any]:
+        """Exactly the rows added."""
+        self._resize(self.n_rows)
+        return self._rows
+
+    def _resize(self, n_rows: int) -> None:
+        self._rows.resize((n_rows, 3), refcheck=False)  # no view is in use any more
 
 
 class _March:
@@ -154,10 +185,8 @@ class _March:
         self._n_cubes = [0, 0]
         self._edges = np.empty(plane_size * self._n_slots, np.int32)
         self._previous: _Plane | None = None
-        self._n_vertices = 0
-        self._n_faces = 0
-        self._vertices: list[NDArray[np.float64]] = []
-        self._faces: list[NDArray[np.int32]] = []
+        self._vertices = _Rows(np.float64)
+        self._faces = _Rows(np.int32)
 
     def add(self, plane: _Plane) -> None:
         """Take the next plane: scan the one before, fill the cubes below that."""
@@ -167,13 +196,10 @@ class _March:
         self.n_planes += 1
 
     def finish(self) -> Mesh:
-        """Scan the last plane and put the pieces together."""
+        """Scan the last plane and hand over the result."""
         assert self._previous is not None
         self._scan(self.n_planes - 1, self._previous, self._previous)
-        vertices = np.concatenate(self._vertices) if self._vertices else np.empty((0, 3))
-        self._vertices.clear()
-        faces = np.concatenate(self._faces) if self._faces else np.empty((0, 3), np.int32)
-        return Mesh(vertices, faces)
+        return Mesh(self._vertices.finish(), self._faces.finish())
 
     def _scan(self, z: int, low: _Plane, high: _Plane) -> None:
         n_numbered, self._n_cubes[z % 2] = kernels.marching.scan_plane(
@@ -183,17 +209,15 @@ class _March:
             self.shape[0],
             self.closed,
             self.tables,
-            self._n_vertices,
+            self._vertices.n_rows,
             self._slot_vertex[z % 2],
             self._edges,
             self._cubes[z % 2],
             self._colours[z % 2],
         )
         if n_numbered:
-            self._n_vertices += n_numbered
-            if self._n_vertices > MAX_CORNERS:
+            if self._vertices.n_rows + n_numbered > MAX_CORNERS:
                 raise VolumeError(f"the surface has more than {MAX_CORNERS:,} vertices")
-            vertices = np.empty((n_numbered, 3))
             kernels.marching.place_vertices(
                 low.samples,
                 high.samples,
@@ -203,9 +227,8 @@ class _March:
                 self.origin,
                 self.tables,
                 self._edges[:n_numbered],
-                vertices,
+                self._vertices.add(n_numbered),
             )
-            self._vertices.append(vertices)
         if z > 0:
             self._emit(z - 1)
 
@@ -236,9 +259,8 @@ class _March:
         first: NDArray[np.int32],
         triangles: NDArray[np.int32],
     ) -> None:
-        faces = np.empty((kernels.marching.count_triangles(colours, first), 3), np.int32)
-        self._n_faces += len(faces)
-        if 3 * self._n_faces > MAX_CORNERS:
+        n_faces = kernels.marching.count_triangles(colours, first)
+        if 3 * (self._faces.n_rows + n_faces) > MAX_CORNERS:
             raise VolumeError(f"the surface has more than {MAX_CORNERS:,} face corners")
         kernels.marching.emit_triangles(
             cubes,
@@ -249,6 +271,5 @@ class _March:
             self._slot_vertex[z % 2],
             self._slot_vertex[(z + 1) % 2],
             self._n_slots,
-            faces,
+            self._faces.add(n_faces),
         )
-        self._faces.append(faces)

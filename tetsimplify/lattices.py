@@ -84,7 +84,7 @@ def lattice_tables(name: str) -> Tables:
     OptionError
         When there is no such lattice.
     """
-    if name not in LATTICES:
+    if not isinstance(name, str) or name not in LATTICES:
         raise OptionError(f"lattice must be one of {', '.join(LATTICES)}, got {name!r}")
     return _tables(name)
 

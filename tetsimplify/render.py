@@ -163,7 +163,7 @@ def _brightness(normals: Floats) -> Floats:
         towards = _unit(np.array(direction))
         # Half wrapped around the surface, as light in a room is.
         brightness += strength * np.clip((normals @ towards + 0.25) / 1.25, 0, None)
-        halfway = _unit(towards + [0.0, 0.0, 1.0])
+        halfway = _unit(towards + np.array([0.0, 0.0, 1.0]))
         brightness += GLOSS * strength * np.clip(normals @ halfway, 0, None) ** 40
     return brightness
 

@@ -16,7 +16,8 @@ each vertex of the seam, so that the mesh is open there::
 both sides stay where they are: nothing tears and nothing bleeds. Then the copies are welded.
 
 What could still go wrong is that the two sides, each for itself, come to have an edge between
-the same two vertices of the seam, which would be one edge of four faces when they are welded.
+the same two vertices of the seam, which would be one edge of four faces when they are welded,
+or a face between the same three.
 This is looked for, and where it happens all is done again with the neighbours of the seam
 locked as well, which excludes it: no contraction then reaches a face at the seam.
 """
@@ -41,6 +42,9 @@ from tetsimplify.topology import topology
 Array = NDArray[Any]
 Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
+
+HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+WEDGE = "\0"  # before the names of wedge data among vertex data, which may have the same names
 
 
 class Seamed(NamedTuple):
@@ -80,16 +84,15 @@ def simplify(
     vertex_data: Mapping[str, Array] | None = None,
     face_data: Mapping[str, Array] | None = None,
     wedge_data: Mapping[str, Array] | None = None,
-    colours: Collection[str] = (),
+    colours: Collection[str] | None = None,
     locked: ArrayLike | None = None,
     repair: bool = False,
     **options: Any,
 ) -> Seamed:
     """Simplify a mesh with its attributes; seams neither tear nor bleed.
 
-    A seam is where wedge data differ at one vertex, or where vertices in exactly the same
-    place differ in vertex data. Vertices in one place that differ in nothing are left alone
-    unless they are on the boundary of a mesh that has such a seam.
+    A seam is where wedge data differ at one vertex, or where vertices on the boundary are in
+    exactly the same place as others there. Neither is merged with the other.
 
     Parameters
     ----------
@@ -98,9 +101,9 @@ def simplify(
     wedge_data : mapping of names to arrays, shapes (m, 3, ...)
         Values at the corners of the faces. A material of each face goes in here as well,
         repeated for its corners: then borders of materials are seams.
-    colours : collection of str
-        Integer vertex and wedge data that are to be interpolated and rounded. Other integers
-        are labels, which are never averaged.
+    colours : collection of str, optional
+        Integer vertex and wedge data that are to be interpolated and rounded; None takes those
+        of 8 bits with 3 or 4 components. Other integers are labels, which are never averaged.
     locked, repair, **options
         As in :func:`tetsimplify.simplify`.
 
@@ -139,31 +142,26 @@ def simplify(
         mesh = Mesh(repaired.vertices, repaired.faces)
 
     parts = cut(mesh.faces, of_wedges.values(), len(mesh.vertices))
-    values = {name: data[parts.origin] for name, data in of_vertices.items()}
-    for name, wedges in of_wedges.items():
-        values[_wedge(name)] = _at_vertices(wedges, parts)
-    place = parts.origin
-    on_seam = parts.on_seam
-    if of_vertices:
-        place, on_copies = _copies(mesh, of_vertices)
-        place, on_seam = place[parts.origin], on_seam | on_copies[parts.origin]
+    seam = _with_copies(_Seam(parts.origin, parts.on_seam), mesh)
+    is_cut = len(parts.origin) > len(mesh.vertices)
+    opened, values = Mesh(mesh.vertices, parts.faces), dict(of_vertices)
+    if is_cut:
+        opened, held = Mesh(mesh.vertices[parts.origin], parts.faces), held[parts.origin]
+        values = {name: data[parts.origin] for name, data in of_vertices.items()}
+    values |= {_wedge(name): _at_vertices(data, parts) for name, data in of_wedges.items()}
 
-    averaged = {name for name in values if name in colours or name[1:] in colours}
+    averaged = _colours(values) if colours is None else set(colours)
+    averaged = {name for name in values if {name, name.removeprefix(WEDGE)} & averaged}
     types = {name: values[name].dtype for name in averaged}
     values |= {name: values[name].astype(np.float64) for name in averaged}
     result = _simplify_cut(
-        Mesh(mesh.vertices[parts.origin], parts.faces),
-        _Seam(place, on_seam),
-        locked=held[parts.origin],
-        vertex_data=values,
-        face_data=of_faces,
-        **options,
+        opened, seam, locked=held, vertex_data=values, face_data=of_faces, **options
     )
     carried = dict(result.vertex_data)
     carried |= {name: _rounded(carried[name], dtype) for name, dtype in types.items()}
     new_wedges = {name: carried.pop(_wedge(name))[result.faces] for name in of_wedges}
     result = result._replace(vertex_data=carried)
-    if len(parts.origin) > len(mesh.vertices):
+    if is_cut:
         result = weld(mesh, result, parts.origin)
     if repaired is not None:
         result = _composed(result, repaired)
@@ -228,6 +226,8 @@ def cut(faces: ArrayLike, wedge_values: Collection[Array] | Array, n_vertices: i
 def _torn_vertices(triangles: Indices, rows: list[Array], n_vertices: int) -> Mask:
     """Vertices with different values at their corners."""
     torn = np.zeros(n_vertices, np.bool_)
+    if not rows:
+        return torn
     corner_vertex = triangles.reshape(-1)
     last = np.zeros(n_vertices, np.int64)
     last[corner_vertex] = np.arange(len(corner_vertex))
@@ -287,8 +287,8 @@ def _at_vertices(wedges: Array, parts: Cut) -> Array:
 
 
 def _wedge(name: str) -> str:
-    """The key of wedge data among vertex data; these may have the same name."""
-    return f"\0{name}"
+    """The key of wedge data among vertex data."""
+    return WEDGE + name
 
 
 # --- copies of vertices ----------------------------------------------------------------------
@@ -296,49 +296,61 @@ def _wedge(name: str) -> str:
 
 def places(vertices: NDArray[np.float64]) -> Indices:
     """The lowest vertex in exactly the same place as each vertex."""
-    n = len(vertices)
     bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # +0.0 makes -0.0 equal to 0.0
-    factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-    mixed = (bits ^ (bits >> np.uint64(29))) * factors
-    key = mixed[:, 0] ^ (mixed[:, 1] >> np.uint64(1)) ^ (mixed[:, 2] >> np.uint64(2))
-    result = np.arange(n, dtype=np.int32)
-    ordered = np.sort(key)
-    if not (ordered[1:] == ordered[:-1]).any():
+    mixed = bits[:, 0] * HASH_FACTORS[0]
+    mixed += bits[:, 1] * HASH_FACTORS[1]
+    mixed += bits[:, 2] * HASH_FACTORS[2]
+    n_bits = max(len(bits), 2).bit_length() + 2  # so few share a slot, and the slots are few
+    slot = (mixed >> np.uint64(64 - n_bits)).view(np.int64)
+    result = np.arange(len(bits), dtype=np.int32)
+    last = np.empty(2**n_bits, np.int32)
+    last[slot] = result
+    is_last = last[slot] == result
+    if is_last.all():
         return result
-    repeated = np.flatnonzero(np.isin(key, ordered[1:][ordered[1:] == ordered[:-1]]))
-    _, first, which = np.unique(bits[repeated], axis=0, return_index=True, return_inverse=True)
-    result[repeated] = repeated[first[which.reshape(-1)]]
+    crowded = np.zeros(2**n_bits, np.bool_)
+    crowded[slot[~is_last]] = True
+    some = np.flatnonzero(crowded[slot])
+    keys, counts = np.unique(mixed[some], return_counts=True)
+    some = some[np.isin(mixed[some], keys[counts > 1])]
+    if len(some) == 0:
+        return result
+    _, first, which = np.unique(bits[some], axis=0, return_index=True, return_inverse=True)
+    result[some] = some[first[which.reshape(-1)]]
     return result
 
 
-def _copies(mesh: Mesh, data: Mapping[str, Array]) -> tuple[Indices, Mask]:
-    """Where vertices are copies of each other, and which of them are on a seam."""
+def _with_copies(seam: _Seam, mesh: Mesh) -> _Seam:
+    """The seam, and in addition the vertices on the boundary that have copies there."""
     place = places(mesh.vertices)
-    on_seam = np.zeros(len(place), np.bool_)
     copies = np.flatnonzero(place != np.arange(len(place)))
     if len(copies) == 0:
-        return place, on_seam
-    rows = [values.reshape(len(place), -1) for values in data.values() if values.size]
-    in_seam = np.zeros(len(place), np.bool_)
-    in_seam[place[copies[_differ(rows, copies, place[copies])]]] = True
-    on_seam = in_seam[place]
-    if on_seam.any():
-        shared = np.zeros(len(place), np.bool_)
-        shared[place[copies]] = True
-        on_seam |= shared[place] & _on_boundary(mesh.faces, len(place))
-    return place, on_seam
+        return seam
+    shared = np.zeros(len(place), np.bool_)
+    shared[place[copies]] = True
+    shared = _on_boundary(mesh.faces, shared[place])
+    n_copies = np.bincount(place[shared], minlength=len(place))
+    on_seam = shared & (n_copies > 1)[place]
+    place = np.where(on_seam, place, np.arange(len(place), dtype=np.int32))
+    return _Seam(place[seam.place], on_seam[seam.place] | seam.on_seam)
 
 
-def _on_boundary(faces: Indices, n_vertices: int) -> Mask:
-    """Vertices of edges with one face."""
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    key = ends[:, 0].astype(np.int64) << 32 | ends[:, 1]
-    edges, counts = np.unique(key, return_counts=True)
+def _on_boundary(faces: Indices, among: Mask) -> Mask:
+    """Which vertices of a set are at edges with one face."""
+    near = faces[among[faces].any(axis=1)]
+    edges, counts = np.unique(_edge_keys(near), return_counts=True)
     lonely = edges[counts == 1]
-    result = np.zeros(n_vertices, np.bool_)
+    result = np.zeros(len(among), np.bool_)
     result[lonely >> 32] = True
     result[lonely & 0xFFFFFFFF] = True
-    return result
+    return result & among
+
+
+def _edge_keys(faces: Indices) -> NDArray[np.int64]:
+    """Both ends of each side of each face as one number."""
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    keys: NDArray[np.int64] = ends.min(axis=1) << 32 | ends.max(axis=1)
+    return keys
 
 
 # --- between cutting and welding ---------------------------------------------------------------
@@ -358,13 +370,13 @@ def _simplify_cut(mesh: Mesh, seam: _Seam, *, locked: Mask, **options: Any) -> S
     result = simplify_arrays(*mesh, locked=locked | seam.on_seam, **options)
     if not seam.on_seam.any():
         return result
-    before = _n_edges_shared(mesh.faces, seam)
-    if _n_edges_shared(result.faces, _followed(seam, result)) == before:
+    before = _n_shared(mesh.faces, seam)
+    if _n_shared(result.faces, _followed(seam, result)) == before:
         return result
     ring = np.zeros(len(mesh.vertices), np.bool_)
     ring[mesh.faces[seam.on_seam[mesh.faces].any(axis=1)]] = True
     result = simplify_arrays(*mesh, locked=locked | ring, **options)
-    if _n_edges_shared(result.faces, _followed(seam, result)) != before:
+    if _n_shared(result.faces, _followed(seam, result)) != before:
         raise MeshError("the two sides of a seam cannot be simplified apart from each other")
     return result
 
@@ -381,17 +393,18 @@ def _followed(seam: _Seam, result: Simplification) -> _Seam:
     return _Seam(place, on_seam)
 
 
-def _n_edges_shared(faces: Indices, seam: _Seam) -> int:
-    """How many edges at the seam become one with another when it is welded."""
+def _n_shared(faces: Indices, seam: _Seam) -> tuple[int, int]:
+    """How many edges and faces at the seam become one with others when it is welded."""
     near = faces[seam.on_seam[faces].any(axis=1)]
-    return _n_edges(near) - _n_edges(seam.place[near])
+    welded = seam.place[near]
+    n_distinct = len(np.unique(np.sort(welded, axis=1), axis=0))
+    return _n_edges(near) - _n_edges(welded), len(near) - n_distinct
 
 
 def _n_edges(faces: Indices) -> int:
     """The number of edges, and none for those that join a vertex to itself."""
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    return len(np.unique((low.astype(np.int64) << 32 | high)[low != high]))
+    keys = np.unique(_edge_keys(faces))
+    return int((keys >> 32 != keys & 0xFFFFFFFF).sum())
 
 
 # --- welding ---------------------------------------------------------------------------------
@@ -461,6 +474,15 @@ def _composed(result: Simplification, repaired: Repaired) -> Simplification:
         face_map=repaired.face_map[result.face_map],
         report=replace(result.report, repairs=repaired.report),
     )
+
+
+def _colours(data: Mapping[str, Array]) -> set[str]:
+    """The data that look like colours: three or four components of 8 bits."""
+    return {
+        name
+        for name, values in data.items()
+        if values.dtype == np.uint8 and values.ndim == 2 and values.shape[1] in (3, 4)
+    }
 
 
 def _rounded(values: Array, dtype: np.dtype[Any]) -> Array:

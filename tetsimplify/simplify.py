@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tetsimplify import kernels
+from tetsimplify import adapters, kernels
 from tetsimplify.arrays import as_data, as_mesh, as_vertex_mask
 from tetsimplify.engine import Engine
 from tetsimplify.mesh import Mesh
@@ -19,9 +20,19 @@ from tetsimplify.report import Simplification, SimplificationReport
 from tetsimplify.topology import topology
 
 
+@overload
 def simplify(
-    vertices: ArrayLike,
-    faces: ArrayLike,
+    vertices: ArrayLike, faces: ArrayLike, *, max_edge_length: float, **options: Any
+) -> Simplification: ...
+
+
+@overload
+def simplify(vertices: Any, faces: None = None, *, max_edge_length: float, **options: Any) -> Any: ...
+
+
+def simplify(
+    vertices: Any,
+    faces: ArrayLike | None = None,
     *,
     max_edge_length: float,
     blocked: str = "contract",
@@ -34,7 +45,7 @@ def simplify(
     vertex_data: Mapping[str, ArrayLike] | None = None,
     face_data: Mapping[str, ArrayLike] | None = None,
     progress: Progress | None = None,
-) -> Simplification:
+) -> Any:
     """Contract every edge shorter than `max_edge_length` without changing the topology.
 
     Where the ends of an edge have more common neighbours than the apexes of its two faces,
@@ -43,7 +54,8 @@ def simplify(
     Parameters
     ----------
     vertices : array_like, shape (n, 3)
-        Positions, finite.
+        Positions, finite. Or, without faces, a mesh object of a package that an adapter is
+        installed for: pymeshlab, Open3D, trimesh, PyVista; see :mod:`tetsimplify.adapters`.
     faces : array_like, shape (m, 3), integers
         A consistently oriented 2-manifold, with or without boundary, of any genus and any
         number of components.
@@ -82,7 +94,7 @@ def simplify(
     -------
     Simplification
         `vertices`, `faces`, `vertex_map` (old to new), `face_map` (new to old), `report`,
-        `vertex_data`, `face_data`.
+        `vertex_data`, `face_data`. For a mesh object, an object of the same kind.
 
     Raises
     ------
@@ -119,6 +131,21 @@ def simplify(
     >>> result.report.topology_after.same_topology(result.report.topology_before)
     True
     """
+    if faces is None:
+        return adapters.simplify(
+            vertices,
+            max_edge_length=max_edge_length,
+            blocked=blocked,
+            placement=placement,
+            removal_limit=removal_limit,
+            outer=outer,
+            foldover=foldover,
+            locked=locked,
+            repair=repair,
+            vertex_data=vertex_data,
+            face_data=face_data,
+            progress=progress,
+        )
     clock = _Clock()
     options = Options(max_edge_length, blocked, placement, removal_limit, outer, foldover)
     with clock.stage("check"):

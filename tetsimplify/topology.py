@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tetsimplify import kernels
+from tetsimplify import adapters, kernels
 from tetsimplify.arrays import as_mesh, listed
 
 Indices = NDArray[np.int32]
@@ -97,13 +98,14 @@ class TopologyReport:
         return "; ".join(found) or None
 
 
-def topology(vertices: ArrayLike, faces: ArrayLike) -> TopologyReport:
+def topology(vertices: Any, faces: ArrayLike | None = None) -> TopologyReport:
     """Tell the topology of a triangle mesh.
 
     Parameters
     ----------
     vertices : array_like, shape (n, 3)
-        Positions; only their number matters here.
+        Positions; only their number matters here. Or, without faces, a mesh object of a package
+        that an adapter is installed for.
     faces : array_like, shape (m, 3), integers
         Vertex indices.
 
@@ -123,6 +125,8 @@ def topology(vertices: ArrayLike, faces: ArrayLike) -> TopologyReport:
     >>> report.euler_characteristic, report.n_boundary_loops, report.edge_degrees
     (1, 1, {1: 3})
     """
+    if faces is None:
+        return adapters.topology(vertices)
     mesh = as_mesh(vertices, faces, finite=False)
     corner_vertex = mesh.faces.reshape(-1)
     corners = kernels.corners.link_corners(corner_vertex, len(mesh.vertices))

@@ -125,8 +125,10 @@ def place_vertices(low, high, level, plane, spacing, origin, tables, edges, vert
         value_b = _sample(low, high, y, x, b)
         t = 0.0
         if slot > 0:
-            # halves, so that the difference of two large numbers stays finite
-            t = (0.5 * level - 0.5 * value_a) / (0.5 * value_b - 0.5 * value_a)
+            # halves, so that the difference of two large numbers stays finite; that of two
+            # numbers next to zero may vanish
+            rise = 0.5 * value_b - 0.5 * value_a
+            t = (0.5 * level - 0.5 * value_a) / rise if rise != 0.0 else 0.5
             t = min(max(t, CLEARANCE), 1.0 - CLEARANCE)
         for axis, index, bit in ((0, plane, 4), (1, y, 2), (2, x, 1)):
             from_a = 1.0 if a & bit else 0.0

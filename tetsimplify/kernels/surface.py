@@ -85,15 +85,15 @@ def chain_arcs(tail, head, n_arcs, slot, successor):
     elif not 0 <= first < n_arcs:
         return IRREGULAR, 0, 0
     i = first
-    for step in range(n_arcs - 1):
+    for _ in range(n_arcs - 1):
         i = successor[i]
         if i < 0 or i == first:
             return IRREGULAR, 0, 0
-    if last >= 0:
+    if i == last:
         return PATH, first, last
-    if n_arcs == 2:  # two faces back to back
-        return IRREGULAR, 0, 0
-    return CYCLE, first, first
+    if last < 0 and successor[i] == first and n_arcs > 2:  # two are faces back to back
+        return CYCLE, first, first
+    return IRREGULAR, 0, 0  # two arcs lead into one vertex
 
 
 @kernel

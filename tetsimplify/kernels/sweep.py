@@ -29,7 +29,9 @@ def sweep(surface, scratch, rules, first, last, colour, retry):
     colour : int
         State that faces get when they are touched; STALE_EVEN and STALE_ODD in turn.
     retry : bool
-        Try faces again all of whose short edges were refused before.
+        Try faces again all of whose short edges were refused before. What is obstructed stays
+        so until one of its ends is contracted with another vertex: a 3-cycle that does not
+        separate, or has a handle or a hole on both sides, keeps that whatever happens elsewhere.
 
     Returns
     -------
@@ -51,6 +53,8 @@ def sweep(surface, scratch, rules, first, last, colour, retry):
         for k in order:
             if costs[k] >= rules.max_length2:
                 break
+            if state == BLOCKED and surface.verdict[3 * f + k] == OBSTRUCTED:
+                continue  # for as long as its ends stay what they are
             outcome = contract_simple(surface, scratch, rules, 3 * f + k, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1

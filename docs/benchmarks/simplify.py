@@ -1,0 +1,588 @@
+"""Measure tetsimplify beside other simplifiers: time, topology of the results, memory.
+
+    python docs/benchmarks/simplify.py gyroid brain dragon.ply --markdown tables.md
+
+A case is ``gyroid``, ``brain`` (the volume in the package), or a mesh file. tetsimplify goes
+first: the edge length is found by bisection so that a part of the faces is left (for the brain
+it is 1.2 median edges), and all others are asked for the number of faces that this gave.
+
+All tools run in one process on one core, in turn, again and again, so that figures of one table
+can be compared; figures of different tables or machines cannot. On a machine with other work to
+do ``--clock cpu`` tells the time of the processor instead of that of the wall. Each tool gets its
+input in the types that it takes, and converting does not count. tetsimplify is timed with all
+that it does: checks, both topologies, the report.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import tetsimplify
+from tetsimplify import Mesh, demo
+from tetsimplify.edges import edge_lengths
+from tetsimplify.io import read_mesh
+
+NAME = "tetsimplify"
+SHARE_TOLERANCE = 2e-4  # of the faces kept, at the end of the bisection
+GYROID_PERIODS = 2
+WIDTH = 170  # of the tables
+Seconds = list[float]
+Times = dict[str, float]  # of the clocks
+Row = dict[str, str]
+CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
+
+# --- the peers -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A simplifier: its package, and how it is prepared and run.
+
+    ``prepare(mesh)`` is not timed and gives what ``run(prepared, n_faces)`` takes, which is
+    timed; ``finish`` makes vertices and faces of its result.
+    """
+
+    name: str
+    package: str
+    prepare: Callable[[Mesh], Any]
+    run: Callable[[Any, int], Any]
+    finish: Callable[[Any], tuple[Any, Any]] = lambda result: result
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether its package can be found, without importing it."""
+        return version_of(self.package) is not None
+
+
+def version_of(package: str) -> str | None:
+    """Version of an installed package, None of others."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def prepare_meshoptimizer(mesh: Mesh) -> Any:
+    """Single precision and unsigned indices are all that it takes."""
+    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32).reshape(-1)
+
+
+def run_meshoptimizer(prepared: Any, n_faces: int) -> Any:
+    """Without a limit on the error, so that the number of faces decides."""
+    import meshoptimizer
+
+    vertices, indices = prepared
+    out = np.empty_like(indices)
+    n = meshoptimizer.simplify(
+        out, indices, vertices, target_index_count=3 * n_faces, target_error=1e9
+    )
+    return vertices, out[:n].reshape(-1, 3)
+
+
+def run_fast_simplification(mesh: Mesh, n_faces: int) -> Any:
+    """As it comes."""
+    import fast_simplification
+
+    return fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=n_faces, agg=7.0)
+
+
+def prepare_pyfqmr(mesh: Mesh) -> Any:
+    """Its object holds the mesh."""
+    import pyfqmr
+
+    simplifier = pyfqmr.Simplify()
+    simplifier.setMesh(mesh.vertices, mesh.faces)
+    return simplifier
+
+
+def run_pyfqmr(simplifier: Any, n_faces: int) -> Any:
+    """As it comes."""
+    simplifier.simplify_mesh(
+        target_count=n_faces, aggressiveness=7, preserve_border=False, verbose=False
+    )
+    return simplifier
+
+
+def prepare_pymeshlab(mesh: Mesh) -> Any:
+    """Its set holds the mesh."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
+    return meshes
+
+
+def run_pymeshlab(preserve_topology: bool) -> Callable[[Any, int], Any]:
+    """With every parameter given, since defaults are kept from the last dialog."""
+
+    def run(meshes: Any, n_faces: int) -> Any:
+        meshes.meshing_decimation_quadric_edge_collapse(
+            targetfacenum=n_faces,
+            targetperc=0.0,
+            qualitythr=0.3,
+            preserveboundary=False,
+            boundaryweight=1.0,
+            preservenormal=False,
+            preservetopology=preserve_topology,
+            optimalplacement=True,
+            planarquadric=False,
+            planarweight=0.001,
+            qualityweight=False,
+            autoclean=False,
+            selected=False,
+        )
+        return meshes
+
+    return run
+
+
+def finish_pymeshlab(meshes: Any) -> tuple[Any, Any]:
+    """Vertices and faces that are not deleted."""
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix()
+
+
+def prepare_vtk(mesh: Mesh) -> Any:
+    """Points stay double."""
+    import pyvista
+
+    return pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+
+
+def run_vtk(method: str, **options: Any) -> Callable[[Any, int], Any]:
+    """One of the decimation filters of PyVista, which are those of VTK."""
+
+    def run(polydata: Any, n_faces: int) -> Any:
+        return getattr(polydata, method)(1.0 - n_faces / polydata.n_cells, **options)
+
+    return run
+
+
+TOOLS = (
+    Tool("meshoptimizer", "meshoptimizer", prepare_meshoptimizer, run_meshoptimizer),
+    Tool("fast-simplification", "fast-simplification", lambda mesh: mesh, run_fast_simplification),
+    Tool("pyfqmr", "pyfqmr", prepare_pyfqmr, run_pyfqmr, lambda tool: tool.getMesh()[:2]),
+    Tool(
+        "pymeshlab quadric",
+        "pymeshlab",
+        prepare_pymeshlab,
+        run_pymeshlab(False),
+        finish_pymeshlab,
+    ),
+    Tool(
+        "pymeshlab quadric, preservetopology",
+        "pymeshlab",
+        prepare_pymeshlab,
+        run_pymeshlab(True),
+        finish_pymeshlab,
+    ),
+    Tool(
+        "VTK quadric decimation",
+        "pyvista",
+        prepare_vtk,
+        run_vtk("decimate"),
+        lambda polydata: (polydata.points, polydata.regular_faces),
+    ),
+    Tool(
+        "VTK DecimatePro, preserve_topology",
+        "pyvista",
+        prepare_vtk,
+        run_vtk("decimate_pro", preserve_topology=True),
+        lambda polydata: (polydata.points, polydata.regular_faces),
+    ),
+)
+
+# --- the cases -------------------------------------------------------------------------------
+
+
+@dataclass
+class Case:
+    """A mesh, and how far it is simplified."""
+
+    name: str
+    mesh: Mesh
+    max_edge_length: float
+
+
+def gyroid(n_faces: int) -> Mesh:
+    """Two periods a side, by marching tetrahedra, with about so many faces."""
+
+    def cut(n: int) -> Mesh:
+        # odd phases, so that no sample lies on the surface
+        angle = GYROID_PERIODS * 2 * np.pi * np.arange(n) / n
+        x, y, z = np.meshgrid(angle + 0.1, angle + 0.2, angle + 0.3, indexing="ij", sparse=True)
+        volume = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+        return tetsimplify.extract_isosurface(volume, 0.0)
+
+    small = 48
+    return cut(round(small * (n_faces / len(cut(small).faces)) ** 0.5))
+
+
+def length_that_keeps(mesh: Mesh, share: float) -> float:
+    """The `max_edge_length` that leaves a share of the faces, by bisection."""
+    low, high = 0.0, float(np.median(edge_lengths(mesh)))
+
+    def kept(length: float) -> float:
+        result = tetsimplify.simplify(*mesh, max_edge_length=length)
+        return len(result.faces) / len(mesh.faces)
+
+    while kept(high) > share:
+        low, high = high, 2 * high
+    while high - low > 1e-5 * high:
+        middle = (low + high) / 2
+        found = kept(middle)
+        if abs(found - share) < SHARE_TOLERANCE:
+            return middle
+        low, high = (middle, high) if found > share else (low, middle)
+    return high
+
+
+def load(case: str, arguments: argparse.Namespace) -> Case:
+    """The case of a name or a file."""
+    if case == "brain":
+        mesh = demo.extract_brain()
+        length = demo.MEDIAN_EDGES * float(np.median(edge_lengths(mesh)))
+        return Case("MNI152 brain, level 80.5, edges below 1.2 median edges", mesh, length)
+    share = arguments.keep / 100
+    mesh = gyroid(arguments.faces) if case == "gyroid" else read_mesh(case)
+    name = "gyroid, two periods a side" if case == "gyroid" else Path(case).stem
+    length = length_that_keeps(mesh, share)
+    return Case(f"{name}, cut to {arguments.keep:g} %", mesh, length)
+
+
+# --- measuring -------------------------------------------------------------------------------
+
+
+@dataclass
+class Measured:
+    """What one tool did in one case."""
+
+    tool: str
+    times: list[Times] = field(default_factory=list)
+    n_faces: int = 0
+    euler_characteristic: int = 0
+    edges_of_degree_above_2: int = 0
+    duplicate_faces: int = 0
+    degenerate_faces: int = 0
+    same_topology: bool = False
+    short_edges: int = 0
+    remaining: dict[str, int] | None = None
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process on one core, where the system allows it."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(allowed)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
+def timed(work: Callable[[], Any]) -> tuple[Times, Any]:
+    """Seconds that something takes by each clock, and its result."""
+    begin = {name: clock() for name, clock in CLOCKS.items()}
+    result = work()
+    return {name: clock() - begin[name] for name, clock in CLOCKS.items()}, result
+
+
+def seconds_of(times: list[Times], clock: str) -> Seconds:
+    """The seconds by one clock."""
+    return [entry[clock] for entry in times]
+
+
+def judge(measured: Measured, case: Case, vertices: Any, faces: Any) -> None:
+    """Look at the topology of a result, and at the short edges left."""
+    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+    found = tetsimplify.topology(*result)
+    measured.n_faces = found.n_faces
+    measured.euler_characteristic = found.euler_characteristic
+    measured.edges_of_degree_above_2 = len(found.non_manifold_edges)
+    measured.duplicate_faces = len(found.duplicate_faces)
+    measured.degenerate_faces = len(found.degenerate_faces)
+    measured.same_topology = found.same_topology(tetsimplify.topology(*case.mesh))
+    measured.short_edges = int((edge_lengths(result) < case.max_edge_length).sum())
+
+
+def compare(case: Case, tools: list[Tool], repeats: int, console: Console) -> list[Measured]:
+    """Run all tools in turn, again and again."""
+    ours = Measured(NAME)
+    rows = [ours, *(Measured(tool.name) for tool in tools)]
+    small = gyroid(10_000)
+    for tool in tools:
+        tool.run(tool.prepare(small), 2_000)
+    for repeat in range(repeats):
+        console.print(f"{case.name}: run {repeat + 1} of {repeats}")
+        times, result = timed(
+            lambda: tetsimplify.simplify(*case.mesh, max_edge_length=case.max_edge_length)
+        )
+        ours.times.append(times)
+        if repeat == 0:
+            judge(ours, case, result.vertices, result.faces)
+            ours.remaining = result.report.remaining
+        for tool, row in zip(tools, rows[1:], strict=True):
+            prepared = tool.prepare(case.mesh)
+            times, raw = timed(lambda tool=tool, given=prepared: tool.run(given, ours.n_faces))
+            row.times.append(times)
+            if repeat == 0:
+                judge(row, case, *tool.finish(raw))
+    return rows
+
+
+def of_topology(mesh: Mesh, repeats: int) -> list[Times]:
+    """Times of `topology`."""
+    return [timed(lambda: tetsimplify.topology(*mesh))[0] for _ in range(repeats)]
+
+
+CHILD_IMPORT = """
+import time
+begin = time.perf_counter()
+import tetsimplify
+print(time.perf_counter() - begin)
+"""
+
+CHILD_FIRST = """
+import time
+begin = time.perf_counter()
+import numpy as np
+i, j = np.divmod(np.arange(20_000), 100)  # a torus of 40,000 faces
+s, t = 2 * np.pi * i / 200, 2 * np.pi * j / 100
+r = 3 + np.cos(t)
+vertices = np.c_[r * np.cos(s), r * np.sin(s), np.sin(t)]
+a, b, c, d = (((i + k) % 200) * 100 + (j + l) % 100 for k, l in ((0, 0), (1, 0), (1, 1), (0, 1)))
+faces = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+import tetsimplify
+tetsimplify.simplify(vertices, faces, max_edge_length=0.15)
+print(time.perf_counter() - begin)
+"""
+
+CHILD_MEMORY = """
+import sys, numpy as np, tetsimplify
+vertices, faces = (np.load(path) for path in sys.argv[1:3])
+tetsimplify.simplify(vertices[:3] + [[0.0], [1.0], [2.0]], [[0, 1, 2]], max_edge_length=0.0)
+def status(key):
+    lines = open("/proc/self/status").read().splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(key))
+before = status("VmRSS:")
+tetsimplify.simplify(vertices, faces, max_edge_length=float(sys.argv[3]))
+print((status("VmHWM:") - before) / len(faces))
+"""
+
+
+def child(code: str, *arguments: str, cache: str | None = None) -> float:
+    """The number that a fresh Python process prints."""
+    environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
+    command = [sys.executable, "-c", code, *arguments]
+    run = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    return float(run.stdout)
+
+
+def cold_starts(repeats: int) -> dict[str, Seconds]:
+    """Seconds in fresh processes: import, and the first call with an empty and a full cache."""
+    child(CHILD_IMPORT)  # so that all files are in memory
+    measured: dict[str, Seconds] = {"import": [child(CHILD_IMPORT) for _ in range(repeats)]}
+    empty: Seconds = []
+    for _ in range(max(1, repeats // 2)):
+        with tempfile.TemporaryDirectory() as cache:
+            empty.append(child(CHILD_FIRST, cache=cache))
+            full = [child(CHILD_FIRST, cache=cache) for _ in range(repeats)]
+    return (
+        measured
+        | {"import and first call, full cache": full}
+        | {"import and first call, empty cache": empty}
+    )
+
+
+def peak_memory(case: Case) -> float | None:
+    """Bytes a face that `simplify` takes at its peak, beyond its input; only on Linux.
+
+    The high-water mark of the process itself is read, since ``ru_maxrss`` of a child begins
+    with that of its parent.
+    """
+    if not Path("/proc/self/status").exists():
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [str(Path(folder, f"{name}.npy")) for name in Mesh._fields]
+        for path, array in zip(paths, case.mesh, strict=True):
+            np.save(path, array)
+        return child(CHILD_MEMORY, *paths, repr(case.max_edge_length))
+
+
+def machine() -> dict[str, Any]:
+    """What this ran on."""
+    cpu = platform.processor()
+    if Path("/proc/cpuinfo").exists():
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        cpu = next((line.split(": ")[1] for line in lines if line.startswith("model name")), cpu)
+    packages = [NAME, "numpy", "numba", "vtk", *(tool.package for tool in TOOLS)]
+    return {
+        "cpu": cpu,
+        "cores": os.cpu_count(),
+        "system": platform.platform(terse=True),
+        "python": platform.python_version(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "versions": {package: version_of(package) for package in dict.fromkeys(packages)},
+    }
+
+
+# --- telling ---------------------------------------------------------------------------------
+
+
+def spread(seconds: Seconds) -> str:
+    """Median and extremes."""
+    return f"{statistics.median(seconds):.3g} ({min(seconds):.3g} to {max(seconds):.3g})"
+
+
+def comparison_rows(measured: list[Measured], clock: str) -> list[Row]:
+    """The table of one case."""
+    seconds = {row.tool: seconds_of(row.times, clock) for row in measured}
+    reference = statistics.median(seconds[NAME])
+    return [
+        {
+            "tool": row.tool,
+            "seconds, median (min to max)": spread(seconds[row.tool]),
+            "ratio": f"{statistics.median(seconds[row.tool]) / reference:.2f}",
+            "faces": f"{row.n_faces:,}",
+            "χ": f"{row.euler_characteristic:,}".replace("-", "\N{MINUS SIGN}"),
+            "edges of degree > 2": f"{row.edges_of_degree_above_2:,}",
+            "duplicate faces": f"{row.duplicate_faces:,}",
+            "degenerate faces": f"{row.degenerate_faces:,}",
+            "same topology": "yes" if row.same_topology else "no",
+            "edges < ε left": f"{row.short_edges:,}",
+        }
+        for row in measured
+    ]
+
+
+def as_rich(title: str, rows: list[Row]) -> Table:
+    """A table for the terminal."""
+    table = Table(title=title, title_justify="left")
+    for k, name in enumerate(rows[0]):
+        table.add_column(name, justify="left" if k == 0 else "right")
+    for row in rows:
+        table.add_row(*row.values())
+    return table
+
+
+def as_markdown(title: str, rows: list[Row]) -> str:
+    """A table for a page."""
+    names = list(rows[0])
+    lines = [names, ["---", *["---:"] * (len(names) - 1)], *(list(row.values()) for row in rows)]
+    return f"### {title}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def parse() -> argparse.Namespace:
+    """What the command line says."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("cases", nargs="*", default=["gyroid", "brain"], metavar="CASE")
+    parser.add_argument("--faces", type=int, default=2_000_000, help="faces of the gyroid")
+    parser.add_argument("--keep", type=float, default=15.0, help="per cent of the faces to keep")
+    parser.add_argument("--repeats", type=int, default=5, help="runs of every tool in every case")
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
+    parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
+    parser.add_argument("--no-cold", action="store_true", help="leave the fresh processes out")
+    parser.add_argument("--json", type=Path, help="file to write all figures to")
+    parser.add_argument("--markdown", type=Path, help="file to write the tables to")
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Measure and tell."""
+    arguments = parse()
+    console = Console(stderr=True)
+    wanted = [
+        tool
+        for tool in TOOLS
+        if arguments.tools is None or any(part in tool.name for part in arguments.tools)
+    ]
+    tools = [tool for tool in wanted if tool.is_installed]
+    figures: dict[str, Any] = {
+        "machine": machine(),
+        "clock": arguments.clock,
+        "absent": [tool.name for tool in wanted if not tool.is_installed],
+        "cases": {},
+    }
+    tables: list[tuple[str, list[Row]]] = []
+    own: list[Row] = []
+    for name in arguments.cases:
+        with one_core():
+            case = load(name, arguments)
+            measured = compare(case, tools, arguments.repeats, console)
+            topology_times = of_topology(case.mesh, arguments.repeats)
+        before = tetsimplify.topology(*case.mesh)
+        memory = peak_memory(case)
+        figures["cases"][case.name] = {
+            "n_faces": before.n_faces,
+            "euler_characteristic": before.euler_characteristic,
+            "n_components": before.n_components,
+            "n_boundary_loops": before.n_boundary_loops,
+            "max_edge_length": case.max_edge_length,
+            "tools": [asdict(row) for row in measured],
+            "topology": topology_times,
+            "peak_bytes_a_face": memory,
+        }
+        chi = f"{before.euler_characteristic:,}".replace("-", "\N{MINUS SIGN}")
+        title = f"{case.name}: {before.n_faces:,} faces, χ = {chi}"
+        tables.append((title, comparison_rows(measured, arguments.clock)))
+        own.append(
+            {
+                "case": case.name,
+                "faces": f"{before.n_faces:,}",
+                "`simplify`, s": spread(seconds_of(measured[0].times, arguments.clock)),
+                "`topology`, s": spread(seconds_of(topology_times, arguments.clock)),
+                "peak memory, bytes a face": "" if memory is None else f"{memory:.0f}",
+                "edges left": ", ".join(f"{k} {n:,}" for k, n in measured[0].remaining.items()),
+            }
+        )
+    if own:
+        tables.append(("tetsimplify alone", own))
+    if not arguments.no_cold:
+        with one_core():
+            figures["cold"] = cold_starts(arguments.repeats)
+        tables.append(
+            (
+                "Fresh processes",
+                [{"": name, "seconds": spread(s)} for name, s in figures["cold"].items()],
+            )
+        )
+
+    out = Console()
+    out.width = max(out.width, WIDTH)
+    for title, rows in tables:
+        out.print(as_rich(title, rows))
+    if figures["absent"]:
+        out.print(f"not installed: {', '.join(figures['absent'])}")
+    out.print(figures["machine"])
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
+    if arguments.markdown:
+        text = "\n".join(as_markdown(title, rows) for title, rows in tables)
+        arguments.markdown.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

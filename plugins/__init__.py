@@ -1,0 +1,1 @@
+"""Adapters, one file for each package whose mesh objects tetsimplify takes."""

@@ -1,0 +1,223 @@
+"""Changes of the current mesh of a ``pymeshlab.MeshSet`` in place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tetsimplify import seams
+from tetsimplify.adapters import MeshArrays, needs
+
+with needs("pymeshlab"):
+    import pymeshlab
+    from pymeshlab import PercentageValue, PyMeshLabException
+
+Data = dict[str, NDArray[Any]]
+
+# as they are before filters are added to them
+apply_filter = pymeshlab.MeshSet.apply_filter
+filter_parameter_values = pymeshlab.MeshSet.filter_parameter_values
+
+
+class Selection(NamedTuple):
+    """What is selected."""
+
+    vertices: NDArray[np.bool_]
+    faces: NDArray[np.bool_]
+
+
+class Writer:
+    r"""Changes the current mesh of a ``MeshSet`` in place.
+
+    PyMeshLab lets Python read a mesh, not write to it. Putting a new mesh in its place would
+    change its id, leave references to it dangling and lose textures, custom attributes and
+    transform. So PyMeshLab's own filters do the work. Every vertex is moved to (new index, 0, 0),
+    and those that are gone far away; faces with long edges are removed, vertices in one place
+    unified, and what is left is moved to where it belongs::
+
+        a---b---c                  0---1---1            0-----1
+         \ / \ /     b, c -> 1      \ / \ /              \   / \
+          d---e                      2---3                2---3
+
+    Positions come from short-lived meshes, by morphing.
+    """
+
+    def __init__(self, ms: pymeshlab.MeshSet) -> None:
+        self.ms, self.mesh = ms, ms.current_mesh()
+        self.apply = partial(apply_filter, ms)
+        names = [key for key in filter_parameter_values(ms, "ply") if "__ca_" in key]
+        self.has_attributes = {kind: any(f"__ca_{kind}" in key for key in names) for kind in "vf"}
+
+    def replace(self, result: seams.Seamed, old: MeshArrays, selected: Selection) -> None:
+        """Make the mesh that of a result."""
+        # so large that where a vertex comes from is less than a rounding error
+        unit = 2.0 ** math.ceil(math.log2(np.abs(old.vertices).max() + 1) + 56)
+        n_new = len(result.vertices)
+        is_gone = result.vertex_map < 0
+        self._move(self._keys(np.where(is_gone, 10 * (n_new + 1), result.vertex_map + 1), unit))
+        if is_gone.any():
+            self.apply("compute_selection_by_edge_length", threshold=4 * (n_new + 1) * unit)
+            self.apply("meshing_remove_selected_faces")
+        self.apply("meshing_remove_duplicate_vertices")
+        self._remove_flat_faces(result, old.faces)
+        self.apply("meshing_remove_unreferenced_vertices")
+        order = np.rint(self.mesh.vertex_matrix()[:, 0] / unit).astype(np.int64) - 1
+        if len(order) != n_new or self.mesh.face_number() != len(result.faces):
+            raise PyMeshLabException(
+                "the filters of PyMeshLab that this is made of "
+                "did not do as expected, and have damaged the current mesh"
+            )
+        keys = self._keys(order + 1, unit)
+        self._write_colors_and_scalars(keys, {k: x[order] for k, x in result.vertex_data.items()})
+        self._select(keys, order, result, selected)
+        if "tex_coord" in result.vertex_data:
+            self._write_tex_coords(result.vertex_data["tex_coord"][order])
+        wedges = result.wedge_data.get("wedge_tex_coord")
+        if wedges is not None:
+            self._write_wedges(result.faces, wedges, order)
+        self._move(result.vertices[order])
+        self.apply("compute_normal_per_face")
+        self.apply("compute_normal_per_vertex")
+
+    @staticmethod
+    def _keys(index: NDArray[Any], unit: float) -> NDArray[np.float64]:
+        keys = np.zeros((len(index), 3), order="F")
+        keys[:, 0] = index * unit
+        return keys
+
+    def _move(self, positions: NDArray[np.float64]) -> None:
+        """Move all vertices, exactly."""
+        with self._short_lived(pymeshlab.Mesh(positions)) as target:
+            for _ in range(4):  # each time what is lost to rounding gets smaller
+                self.apply("compute_coord_linear_morphing", targetmesh=target, percentmorph=100.0)
+                if np.array_equal(self.mesh.vertex_matrix(), positions):
+                    return
+        raise PyMeshLabException("the vertices cannot be moved")
+
+    @contextmanager
+    def _short_lived(self, mesh: pymeshlab.Mesh) -> Iterator[int]:
+        """A mesh beside the current one, as its id."""
+        current = self.ms.current_mesh_id()
+        self.ms.add_mesh(mesh, "", False)
+        number = max(mesh.id() for mesh in self.ms)
+        try:
+            yield number
+        finally:
+            self.ms.set_current_mesh(number)
+            self.apply("delete_current_mesh")
+            self.ms.set_current_mesh(current)
+
+    def _remove_flat_faces(self, result: seams.Seamed, faces: NDArray[np.int32]) -> None:
+        """Remove pairs of faces that lie on each other, which nested contractions can leave."""
+        if self.mesh.face_number() == len(result.faces):
+            return
+        a, b, c = np.append(result.vertex_map, np.int32(-1))[faces].T
+        left = np.flatnonzero(
+            (a != b) & (b != c) & (c != a) & (np.minimum(a, np.minimum(b, c)) >= 0)
+        )
+        flat = np.flatnonzero(~np.isin(left, result.face_map))
+        for chunk in np.array_split(flat[::-1], len(flat) // 100 + 1):  # from the last: all keep
+            condition = "||".join(f"(fi=={face})" for face in chunk)  # their numbers
+            self.apply("compute_selection_by_condition_per_face", condselect=condition)
+            self.apply("meshing_remove_selected_faces")
+
+    def _write_colors_and_scalars(self, keys: NDArray[np.float64], data: Data) -> None:
+        given = {k: v for k, v in (("color", "matrix"), ("scalar", "array")) if k in data}
+        if not given:
+            return
+        arguments = {
+            f"v_{name}_{shape}": levels(data[name]) if name == "color" else data[name]
+            for name, shape in given.items()
+        }
+        with self._short_lived(pymeshlab.Mesh(keys, **arguments)) as source:
+            self._transfer(
+                source, colortransfer="color" in given, qualitytransfer="scalar" in given
+            )
+
+    def _select(
+        self,
+        keys: NDArray[np.float64],
+        order: NDArray[np.int64],
+        result: seams.Seamed,
+        selected: Selection,
+    ) -> None:
+        """Select what is left of the faces and vertices that were selected."""
+        self.apply("set_selection_none")
+        faces_selected = selected.faces[result.face_map]
+        if faces_selected.all():
+            self.apply("set_selection_all", allverts=False)
+        elif faces_selected.any():
+            # of a face with a vertex that only selected faces have
+            inside = np.zeros(len(order), np.bool_)
+            inside[result.faces[faces_selected]] = True
+            inside[result.faces[~faces_selected]] = False
+            self._select_vertices(keys, inside[order])
+            self.apply("compute_selection_transfer_vertex_to_face", inclusive=False)
+        kept = np.flatnonzero(selected.vertices & (result.vertex_map >= 0))
+        vertices = np.zeros(len(order), np.bool_)
+        vertices[result.vertex_map[kept]] = True
+        self._select_vertices(keys, vertices[order])
+
+    def _select_vertices(self, keys: NDArray[np.float64], chosen: NDArray[np.bool_]) -> None:
+        self.apply("set_selection_none", allfaces=False)
+        if not chosen.any():
+            return
+        source = pymeshlab.Mesh(keys, v_scalar_array=chosen.astype(np.float64))
+        with self._short_lived(source) as number:
+            current = self.ms.current_mesh_id()
+            self.ms.set_current_mesh(number)
+            self.apply("compute_selection_by_scalar_per_vertex", minq=0.5, maxq=2.0)
+            self.ms.set_current_mesh(current)
+            self._transfer(number, colortransfer=False, selectiontransfer=True)
+
+    def _transfer(self, source: int, **what: bool) -> None:
+        """Take values of the vertices from another mesh, in the same places."""
+        self.apply(
+            "transfer_attributes_per_vertex",
+            sourcemesh=source,
+            targetmesh=self.mesh.id(),
+            vertexsampling=True,
+            upperbound=PercentageValue(1),
+            **what,
+        )
+
+    def _write_tex_coords(self, uv: NDArray[np.float64]) -> None:
+        self._move(np.column_stack([uv, np.zeros(len(uv))]))
+        if not self.has_attributes["v"]:
+            self.apply("compute_texcoord_by_function_per_vertex", u="x", v="y")
+
+    def _write_wedges(
+        self, faces: NDArray[np.int32], uv: NDArray[np.float64], order: NDArray[np.int64]
+    ) -> None:
+        """Write those that may have changed: at vertices whose wedges all have the same."""
+        at_vertex = np.zeros((len(order), 3))
+        at_vertex[faces, :2] = uv
+        on_seam = np.zeros(len(order), np.bool_)
+        on_seam[faces[(at_vertex[faces, :2] != uv).any(axis=2)]] = True
+        at_vertex[on_seam] = (0, 0, 1)
+        self._move(at_vertex[order])
+        self.apply(
+            "compute_texcoord_by_function_per_wedge",
+            **{f"u{k}": f"z{k} > 0.5 ? wtu{k} : x{k}" for k in range(3)},
+            **{f"v{k}": f"z{k} > 0.5 ? wtv{k} : y{k}" for k in range(3)},
+        )
+
+
+def textures_of_faces(mesh: pymeshlab.Mesh) -> NDArray[np.float64]:
+    """The number of the texture of each face."""
+    ms = pymeshlab.MeshSet()
+    ms.add_mesh(mesh)
+    apply_filter(ms, "compute_new_custom_scalar_attribute_per_face", name="texture", expr="ti")
+    numbers: NDArray[np.float64] = ms.current_mesh().face_custom_scalar_attribute_array("texture")
+    return numbers
+
+
+def levels(colors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colours so that PyMeshLab, which keeps 8 bits and rounds down, takes the nearest ones."""
+    return (np.rint(255 * colors) + 0.25) / 255
