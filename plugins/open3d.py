@@ -119,8 +119,8 @@ def simplify(mesh: Any, *, return_report: bool = False, **options: Any) -> Any:
         )
     except MeshError as error:
         raise NotManifoldError(
-            f"{error}. Ask is_edge_manifold(), is_vertex_manifold(), is_orientable(); "
-            "remove_non_manifold_edges(), orient_triangles() or repair=True may help."
+            f"{error} (see is_edge_manifold(), is_vertex_manifold(), is_orientable(); "
+            "remove_non_manifold_edges() and orient_triangles() may help)"
         ) from error
     of_vertices = result.vertex_data
     if "normals" in of_vertices:
@@ -163,8 +163,8 @@ def volume_to_open3d(volume: Any, level: float, *, tensor: bool = False, **optio
     Examples
     --------
     >>> x, y, z = np.mgrid[-1:1:30j, -1:1:30j, -1:1:30j]
-    >>> volume_to_open3d(0.8 - np.sqrt(x**2 + y**2 + z**2), 0.0).is_watertight()
-    True
+    >>> volume_to_open3d(0.8 - np.sqrt(x**2 + y**2 + z**2), 0.0).euler_poincare_characteristic()
+    2
     """
     mesh = extract_isosurface(volume, level, **options)
     return to_open3d(*mesh, like=TensorMesh() if tensor else None)

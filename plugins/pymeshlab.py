@@ -176,7 +176,7 @@ def to_pymeshlab(
     Returns
     -------
     pymeshlab.Mesh
-        With normals computed by PyMeshLab where none are given.
+        Normals of vertices, which PyMeshLab computes itself, are not taken over.
     """
     arguments: dict[str, Any] = {}
     custom: list[tuple[str, str, NDArray[Any]]] = []

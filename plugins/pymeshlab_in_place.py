@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,12 +76,13 @@ class Writer:
             )
         keys = self._keys(order + 1, unit)
         self._write_colors_and_scalars(keys, {k: x[order] for k, x in result.vertex_data.items()})
-        self._select(keys, order, result, selected)
         if "tex_coord" in result.vertex_data:
             self._write_tex_coords(result.vertex_data["tex_coord"][order])
         wedges = result.wedge_data.get("wedge_tex_coord")
         if wedges is not None:
             self._write_wedges(result.faces, wedges, order)
+            self._move(keys)
+        self._select(keys, order, result, selected)
         self._move(result.vertices[order])
         self.apply("compute_normal_per_face")
         self.apply("compute_normal_per_vertex")
@@ -149,20 +151,46 @@ class Writer:
     ) -> None:
         """Select what is left of the faces and vertices that were selected."""
         self.apply("set_selection_none")
-        faces_selected = selected.faces[result.face_map]
-        if faces_selected.all():
+        chosen = selected.faces[result.face_map]
+        if chosen.all():
             self.apply("set_selection_all", allverts=False)
-        elif faces_selected.any():
-            # of a face with a vertex that only selected faces have
+        elif chosen.any() and not self.has_attributes["f"]:
+            self._select_faces(result.faces, chosen, order)
+            self._move(keys)
+        elif chosen.any():  # of a face with a vertex that only selected faces have
             inside = np.zeros(len(order), np.bool_)
-            inside[result.faces[faces_selected]] = True
-            inside[result.faces[~faces_selected]] = False
+            inside[result.faces[chosen]] = True
+            inside[result.faces[~chosen]] = False
             self._select_vertices(keys, inside[order])
             self.apply("compute_selection_transfer_vertex_to_face", inclusive=False)
         kept = np.flatnonzero(selected.vertices & (result.vertex_map >= 0))
         vertices = np.zeros(len(order), np.bool_)
         vertices[result.vertex_map[kept]] = True
         self._select_vertices(keys, vertices[order])
+
+    def _select_faces(
+        self, faces: NDArray[np.int32], chosen: NDArray[np.bool_], order: NDArray[np.int64]
+    ) -> None:
+        """Select faces: move the vertices so that an expression tells these from others.
+
+        Most are known by a vertex that no other face has. Of the rest each is known by one of
+        its directed edges, v to w; a vertex v is moved to (number, w, w').
+        """
+        place = np.full((len(order), 3), -1.0)
+        place[:, 0] = np.arange(len(order))
+        inside = np.ones(len(order), np.bool_)
+        inside[faces[~chosen]] = False
+        place[inside, 1] = -2
+        left = np.flatnonzero(chosen & ~inside[faces].any(axis=1))
+        for axis, k in product((1, 2), range(3)):
+            v, w = faces[left, k], faces[left, (k + 1) % 3]
+            _, first = np.unique(v, return_index=True)
+            free = first[place[v[first], axis] == -1]
+            place[v[free], axis] = w[free]
+            left = np.delete(left, free)
+        self._move(place[order])
+        terms = [f"y{k}==-2||y{k}==x{(k + 1) % 3}||z{k}==x{(k + 1) % 3}" for k in range(3)]
+        self.apply("compute_selection_by_condition_per_face", condselect="||".join(terms))
 
     def _select_vertices(self, keys: NDArray[np.float64], chosen: NDArray[np.bool_]) -> None:
         self.apply("set_selection_none", allfaces=False)
@@ -195,18 +223,28 @@ class Writer:
     def _write_wedges(
         self, faces: NDArray[np.int32], uv: NDArray[np.float64], order: NDArray[np.int64]
     ) -> None:
-        """Write those that may have changed: at vertices whose wedges all have the same."""
-        at_vertex = np.zeros((len(order), 3))
-        at_vertex[faces, :2] = uv
-        on_seam = np.zeros(len(order), np.bool_)
-        on_seam[faces[(at_vertex[faces, :2] != uv).any(axis=2)]] = True
-        at_vertex[on_seam] = (0, 0, 1)
-        self._move(at_vertex[order])
-        self.apply(
-            "compute_texcoord_by_function_per_wedge",
-            **{f"u{k}": f"z{k} > 0.5 ? wtu{k} : x{k}" for k in range(3)},
-            **{f"v{k}": f"z{k} > 0.5 ? wtv{k} : y{k}" for k in range(3)},
-        )
+        """Write texture coordinates per wedge, from vertices that are moved to these.
+
+        At a seam a vertex has several, so faces whose vertices agree are written together.
+        """
+        left = np.ones(len(faces), np.bool_)
+        while left.any():
+            at_vertex = np.zeros((len(order), 3))
+            at_vertex[faces[left], :2] = uv[left]
+            agrees = left & (at_vertex[faces, :2] == uv).all(axis=(1, 2))
+            if not agrees.any():  # no face won all its vertices: one at a time
+                face = np.flatnonzero(left)[0]
+                at_vertex[faces[face], :2] = uv[face]
+                agrees[face] = True
+            self._select_faces(faces, agrees, order)
+            self._move(at_vertex[order])
+            self.apply(
+                "compute_texcoord_by_function_per_wedge",
+                **{f"u{k}": f"x{k}" for k in range(3)},
+                **{f"v{k}": f"y{k}" for k in range(3)},
+                onselected=True,
+            )
+            left &= ~self.mesh.face_selection_array()
 
 
 def textures_of_faces(mesh: pymeshlab.Mesh) -> NDArray[np.float64]:

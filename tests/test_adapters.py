@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import tetsimplify
+from test_docs import ROOT, examples
 from tetsimplify import MeshError, MissingExtraError, OptionError, adapters
 
 HOSTS = ("open3d", "pymeshlab", "pyvista", "trimesh", "vtk", "vtkmodules")
@@ -95,3 +96,8 @@ def test_importing_and_asking_imports_no_host():
 
 def test_the_plugins_are_installed():
     assert {"open3d", "pymeshlab", "pyvista", "trimesh"} <= set(adapters.names())
+
+
+def test_the_page_on_writing_an_adapter_is_true():
+    page = ROOT / "docs" / "plugins" / "writing-an-adapter.md"
+    exec(compile(examples(page), str(page), "exec"), {"__name__": "example"})

@@ -43,7 +43,7 @@ def same_values_at_each_vertex(faces, wedges) -> bool:
     return bool((low >= high).all())
 
 
-# --- cutting and welding -----------------------------------------------------------------------
+# --- cutting and welding -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -91,10 +91,10 @@ def as_vertex_mask(name: str, vertices: ArrayLike | None, n_vertices: int) -> ND
             f"{name} must be a boolean mask or a list of vertex indices, got an array of "
             f"dtype {chosen.dtype} and shape {chosen.shape}"
         )
-    if chosen.min() < 0 or chosen.max() >= n_vertices:
+    low, high = int(chosen.min()), int(chosen.max())
+    if low < 0 or high >= n_vertices:
         raise OptionError(
-            f"{name} must hold vertex indices from 0 to {n_vertices - 1}, got {int(chosen.min())} "
-            f"to {int(chosen.max())}"
+            f"{name} must hold vertex indices from 0 to {n_vertices - 1}, got {low} to {high}"
         )
     mask[chosen] = True
     return mask
@@ -127,9 +127,9 @@ def as_triple(name: str, values: ArrayLike, *, positive: bool = False) -> NDArra
     """Cast three finite numbers, one for each axis."""
     triple = np.asarray(values, dtype=np.float64)
     if triple.shape != (3,) or not np.isfinite(triple).all():
-        raise OptionError(f"{name} must be three finite numbers, got {values}")
+        raise OptionError(f"{name} must be three finite numbers, got {values!r}")
     if positive and not (triple > 0).all():
-        raise OptionError(f"{name} must be positive, got {values}")
+        raise OptionError(f"{name} must be positive, got {values!r}")
     return triple
 
 

@@ -168,7 +168,7 @@ def simplify(
     return Seamed(*result, new_wedges)
 
 
-# --- cutting -------------------------------------------------------------------------------
+# --- cutting -------------------------------------------------------------------------------------
 
 
 def cut(faces: ArrayLike, wedge_values: Collection[Array] | Array, n_vertices: int) -> Cut:
@@ -291,7 +291,7 @@ def _wedge(name: str) -> str:
     return WEDGE + name
 
 
-# --- copies of vertices ----------------------------------------------------------------------
+# --- copies of vertices --------------------------------------------------------------------------
 
 
 def places(vertices: NDArray[np.float64]) -> Indices:
@@ -353,7 +353,7 @@ def _edge_keys(faces: Indices) -> NDArray[np.int64]:
     return keys
 
 
-# --- between cutting and welding ---------------------------------------------------------------
+# --- between cutting and welding -----------------------------------------------------------------
 
 
 class _Seam(NamedTuple):
@@ -407,7 +407,7 @@ def _n_edges(faces: Indices) -> int:
     return int((keys >> 32 != keys & 0xFFFFFFFF).sum())
 
 
-# --- welding ---------------------------------------------------------------------------------
+# --- welding -------------------------------------------------------------------------------------
 
 
 def weld(mesh: Mesh, result: Simplification, origin: Indices) -> Simplification:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,16 +18,6 @@ from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.repair import repair as repair_mesh
 from tetsimplify.report import Simplification, SimplificationReport
 from tetsimplify.topology import topology
-
-
-@overload
-def simplify(
-    vertices: ArrayLike, faces: ArrayLike, *, max_edge_length: float, **options: Any
-) -> Simplification: ...
-
-
-@overload
-def simplify(vertices: Any, faces: None = None, *, max_edge_length: float, **options: Any) -> Any: ...
 
 
 def simplify(
@@ -45,7 +35,7 @@ def simplify(
     vertex_data: Mapping[str, ArrayLike] | None = None,
     face_data: Mapping[str, ArrayLike] | None = None,
     progress: Progress | None = None,
-) -> Any:
+) -> Simplification:
     """Contract every edge shorter than `max_edge_length` without changing the topology.
 
     Where the ends of an edge have more common neighbours than the apexes of its two faces,

@@ -1,0 +1,495 @@
+"""PyMeshLab meshes in and out, and the filters in PyMeshLab."""
+
+from __future__ import annotations
+
+import doctest
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from data import data_dir, needs_data
+
+import tetsimplify
+from tetsimplify.errors import MeshError
+
+pymeshlab = pytest.importorskip("pymeshlab")
+plugin = pytest.importorskip("tetsimplify.plugins.pymeshlab")
+from pymeshlab import (  # noqa: E402
+    InvalidEnumException,
+    Mesh,
+    MeshSet,
+    PercentageValue,
+    PureValue,
+    PyMeshLabException,
+)
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "plugins" / "pymeshlab.md"
+SIMPLIFY = "meshing_decimation_topology_preserving_edge_collapse"
+LENGTH = PureValue(0.15)
+OTHER = "meshing_isotropic_explicit_remeshing"  # a filter of PyMeshLab with a length
+
+
+def sphere(**kwargs):
+    ms = MeshSet(**kwargs)
+    ms.create_sphere(subdiv=5)
+    return ms
+
+
+def grid(n=24):
+    """A square and, for each face, whether it is right of the middle."""
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    a = np.flatnonzero((x < n) & (y < n))
+    faces = np.concatenate([np.c_[a, a + 1, a + n + 2], np.c_[a, a + n + 2, a + n + 1]])
+    return np.c_[x, y, 0 * x] / n, faces, x[faces].mean(axis=1) > n / 2
+
+
+def textured_grid():
+    """A square whose halves belong to two charts, 0.5 apart in u."""
+    vertices, faces, right = grid()
+    uv = vertices[faces][:, :, :2] + np.where(right[:, None, None], (0.5, 0), 0)
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces, w_tex_coords_matrix=uv.reshape(-1, 2)), "square")
+    return ms
+
+
+def same(a, b):
+    return all(np.array_equal(x, y) for x, y in zip(a[:2], b[:2], strict=True)) and all(
+        d.keys() == e.keys() and all(np.array_equal(d[k], e[k]) for k in d)
+        for d, e in zip(a[2:], b[2:], strict=True)
+    )
+
+
+def triangles(vertices, faces):
+    """All triangles as positions, whatever the vertices are called; the face order is kept."""
+    return np.asarray(vertices)[np.asarray(faces)]
+
+
+def message_of(call, error=PyMeshLabException):
+    with pytest.raises(error) as caught:
+        call()
+    return str(caught.value)
+
+
+# --- in place --------------------------------------------------------------------------------
+
+
+def test_result_is_that_of_the_core():
+    ms = sphere()
+    arrays = plugin.from_pymeshlab(ms.current_mesh())
+    expected = tetsimplify.simplify(arrays.vertices, arrays.faces, max_edge_length=0.15)
+    figures = ms.meshing_decimation_topology_preserving_edge_collapse(maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    new = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    assert np.array_equal(new, triangles(expected.vertices, expected.faces))
+    assert figures["faces_number"] == mesh.face_number() == len(expected.faces)
+    assert figures["faces_number_before"] == len(arrays.faces)
+    assert figures["genus"] == 0 and figures["remaining_short_edges"] == {}
+
+
+def test_all_ways_to_call_are_the_same():
+    results = []
+    for call in (
+        lambda ms: ms.meshing_decimation_topology_preserving_edge_collapse(maxedgelength=LENGTH),
+        lambda ms: ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH),
+        lambda ms: ms.apply_filter(filter_name=SIMPLIFY, maxedgelength=LENGTH),
+        lambda ms: plugin.simplify_current_mesh(ms, maxedgelength=LENGTH),
+    ):
+        ms = sphere()
+        assert call(ms)["contractions_number"] > 0
+        results.append(ms.current_mesh().vertex_matrix())
+    assert all(np.array_equal(results[0], other) for other in results)
+
+
+def test_mesh_stays_what_it_was_and_others_untouched():
+    ms = MeshSet()
+    for k in range(3):
+        ms.create_sphere(subdiv=4 + k)
+    ms.set_current_mesh(1)
+    mesh = ms.current_mesh()
+    mesh.set_label("the one")
+    matrix = np.diag([2.0, 3.0, 4.0, 1.0])
+    ms.set_matrix(transformmatrix=matrix, freeze=False)
+    others = [plugin.from_pymeshlab(ms.mesh(k)) for k in (0, 2)]
+    n_faces = mesh.face_number()
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    assert mesh.face_number() < n_faces  # the reference that we hold still is the mesh
+    assert ms.current_mesh_id() == mesh.id() == 1 and ms.mesh_number() == 3
+    assert [each.id() for each in ms] == [0, 1, 2]
+    assert mesh.label() == "the one" and mesh.is_compact()
+    assert np.array_equal(mesh.transform_matrix(), matrix)
+    assert all(
+        same(a, plugin.from_pymeshlab(ms.mesh(k))) for a, k in zip(others, (0, 2), strict=True)
+    )
+
+
+def test_percentage_is_of_the_diagonal():
+    ms = sphere()
+    diagonal = ms.current_mesh().bounding_box().diagonal()
+    values = ms.filter_parameter_values(SIMPLIFY, maxedgelength=PercentageValue(5))
+    assert values["maxedgelength"] == pytest.approx(0.05 * diagonal)
+    assert values["removallimit"] == pytest.approx(0.2 * diagonal)
+    assert values["selected"] is False
+    other = sphere()
+    ms.apply_filter(SIMPLIFY, maxedgelength=PercentageValue(5))
+    other.apply_filter(SIMPLIFY, maxedgelength=PureValue(values["maxedgelength"]))
+    assert ms.current_mesh().face_number() == other.current_mesh().face_number()
+
+
+def test_normals_and_bounding_box_are_those_of_the_result():
+    ms = sphere()
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    vertices, box = mesh.vertex_matrix(), mesh.bounding_box()
+    assert np.allclose(box.max(), vertices.max(axis=0)) and np.allclose(
+        box.min(), vertices.min(axis=0)
+    )
+    ways = [mesh.vertex_normal_matrix(), mesh.face_normal_matrix()]
+    ms.compute_normal_per_face()
+    ms.compute_normal_per_vertex()
+    assert np.allclose(ways[0], mesh.vertex_normal_matrix())
+    assert np.allclose(ways[1], mesh.face_normal_matrix())
+
+
+def test_balloon_that_is_removed():
+    """Vertices that vanish without becoming another one, and faces between those that stay."""
+    ms = MeshSet()
+    ms.create_sphere(subdiv=5)
+    vertices = np.ascontiguousarray(ms.current_mesh().vertex_matrix())
+    faces = ms.current_mesh().face_matrix()
+    # a pinched sphere: nested triangles around its waist
+    vertices[:, :2] *= (0.004 + np.abs(vertices[:, 2:]) ** 2)[:, :1]
+    expected = tetsimplify.simplify(vertices, faces, max_edge_length=0.1, removal_limit=np.inf)
+    assert expected.report.n_nested > 0 and (expected.vertex_map < 0).any()
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces))
+    ms.apply_filter(SIMPLIFY, maxedgelength=PureValue(0.1), removallimit=PureValue(1e9))
+    mesh = ms.current_mesh()
+    new = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    assert np.array_equal(new, triangles(expected.vertices, expected.faces))
+
+
+# --- what a mesh carries -----------------------------------------------------------------------
+
+
+def test_vertex_data_stay_linear():
+    ms = sphere()
+    ms.compute_scalar_by_function_per_vertex(q="x + 2*y - 3*z")
+    ms.compute_color_by_function_per_vertex(x="127*(x+1)", y="127*(y+1)", z="127*(z+1)", a="200")
+    ms.compute_texcoord_by_function_per_vertex(u="x", v="z")
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    vertices = mesh.vertex_matrix()
+    assert np.abs(mesh.vertex_scalar_array() - vertices @ (1, 2, -3)).max() < 1e-12
+    colors = np.rint(255 * mesh.vertex_color_matrix())
+    assert np.abs(colors[:, :3] - 127 * (vertices + 1)).max() < 2
+    assert (colors[:, 3] == 200).all()
+    assert np.abs(mesh.vertex_tex_coord_matrix() - vertices[:, [0, 2]]).max() < 1e-6
+
+
+def test_face_data_are_those_of_the_faces_left():
+    ms = sphere()
+    mesh = ms.current_mesh()
+    ms.compute_scalar_by_function_per_face(q="fi")
+    ms.compute_color_by_function_per_face(r="255*(x0 > 0)", g="7", b="fi", a="255")
+    colors = mesh.face_color_matrix()
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    source = mesh.face_scalar_array().astype(int)
+    assert len(np.unique(source)) == len(source) == mesh.face_number()
+    assert np.array_equal(mesh.face_color_matrix(), colors[source])
+
+
+@pytest.mark.parametrize("before_add", [False, True])
+def test_custom_attributes(before_add):
+    """Also those that a mesh had before it was added, which PyMeshLab's own filters die of."""
+    holder = sphere()
+    arrays = plugin.from_pymeshlab(holder.current_mesh())
+    given = Mesh(arrays.vertices, arrays.faces)
+    ms = MeshSet()
+    if not before_add:
+        ms.add_mesh(given)
+        given = ms.current_mesh()
+    given.add_vertex_custom_scalar_attribute(np.arange(len(arrays.vertices), dtype=float), "id")
+    given.add_vertex_custom_point_attribute(arrays.vertices, "was")
+    given.add_face_custom_scalar_attribute(np.arange(len(arrays.faces), dtype=float), "id")
+    given.add_face_custom_point_attribute(arrays.vertices[arrays.faces[:, 0]], "corner")
+    if before_add:
+        ms.add_mesh(given)
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    ids = mesh.vertex_custom_scalar_attribute_array("id").astype(int)
+    was = mesh.vertex_custom_point_attribute_matrix("was")
+    assert np.array_equal(was, arrays.vertices[ids])
+    assert np.linalg.norm(was - mesh.vertex_matrix(), axis=1).max() < 3 * LENGTH.value()
+    ids = mesh.face_custom_scalar_attribute_array("id").astype(int)
+    corners = mesh.face_custom_point_attribute_matrix("corner")
+    assert np.array_equal(corners, arrays.vertices[arrays.faces[ids, 0]])
+
+
+def test_texture_seam_neither_tears_nor_bleeds(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # PyMeshLab writes the dummy texture there
+    ms = textured_grid()
+    mesh = ms.current_mesh()
+    ms.set_texture_per_mesh(textname="t.png", use_dummy_texture=True)
+    names = list(mesh.textures())
+    n_faces = mesh.face_number()
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    assert mesh.face_number() < n_faces / 3
+    assert names and list(mesh.textures()) == names
+    vertices, faces = mesh.vertex_matrix(), mesh.face_matrix()
+    right = vertices[faces, 0].mean(axis=1) > 0.5
+    expected = vertices[faces][:, :, :2] + np.where(right[:, None, None], (0.5, 0), 0)
+    uv = mesh.wedge_tex_coord_matrix().reshape(-1, 3, 2)
+    assert np.abs(uv - expected).max() < 1e-6
+    assert ms.get_topological_measures()["number_holes"] == 1  # the seam is welded
+
+
+@pytest.mark.parametrize("selected", [True, None])
+def test_only_selected_faces_change(selected):
+    ms = sphere()
+    ms.compute_selection_by_condition_per_face(condselect="x0 > 0")
+    mesh = ms.current_mesh()
+    ms.compute_scalar_by_function_per_face(q="fi")
+    is_selected = mesh.face_selection_array()
+    before = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    ms.apply_filter(
+        SIMPLIFY, maxedgelength=LENGTH, **({} if selected is None else {"selected": True})
+    )
+    source = mesh.face_scalar_array().astype(int)
+    after = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    kept = ~is_selected[source]
+    assert kept.sum() == (~is_selected).sum()
+    assert np.array_equal(after[kept], before[~is_selected])
+    assert (~kept).sum() < is_selected.sum() / 3
+    chosen = mesh.face_selection_array()
+    assert np.array_equal(chosen, ~kept)
+
+
+def test_selection_of_everything_and_of_vertices():
+    ms = sphere()
+    ms.set_selection_all()
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    assert mesh.selected_face_number() == mesh.face_number()
+    assert mesh.selected_vertex_number() == mesh.vertex_number()
+
+
+def test_preserveboundary():
+    vertices, faces, _ = grid()
+    rim = {tuple(p) for p in vertices if not ((0 < p[:2]) & (p[:2] < 1)).all()}
+    for preserve in (False, True):
+        ms = MeshSet()
+        ms.add_mesh(Mesh(vertices, faces))
+        ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH, preserveboundary=preserve)
+        left = {tuple(p) for p in ms.current_mesh().vertex_matrix()}
+        assert (rim <= left) is preserve
+
+
+# --- plain functions ---------------------------------------------------------------------------
+
+
+def rich_mesh():
+    ms = sphere()
+    ms.compute_scalar_by_function_per_vertex(q="x")
+    ms.compute_color_by_function_per_vertex(x="127*(x+1)", y="vi", z="3", a="255")
+    ms.compute_scalar_by_function_per_face(q="fi")
+    ms.compute_color_by_function_per_face(r="fi", g="fi/2", b="1", a="255")
+    ms.compute_texcoord_by_function_per_vertex(u="x", v="y")
+    ms.compute_texcoord_parametrization_triangle_trivial_per_wedge()
+    mesh = ms.current_mesh()
+    mesh.add_vertex_custom_point_attribute(np.ascontiguousarray(mesh.vertex_matrix()), "place")
+    mesh.add_face_custom_scalar_attribute(np.arange(mesh.face_number(), dtype=float), "id")
+    return ms, mesh
+
+
+def test_round_trip_is_exact():
+    _ms, mesh = rich_mesh()
+    arrays = plugin.from_pymeshlab(mesh, ["place", "id"])
+    assert {"normal", "color", "scalar", "tex_coord", "custom.place"} <= arrays.vertex_data.keys()
+    assert {"normal", "color", "scalar", "wedge_tex_coord", "custom.id"} == arrays.face_data.keys()
+    again = plugin.to_pymeshlab(*arrays, like=mesh)
+    assert again.label() == mesh.label()
+    back = plugin.from_pymeshlab(again, ["place", "id"])
+    for each in (arrays, back):
+        del each.vertex_data["normal"]  # PyMeshLab computes its own
+    assert same(arrays, back)
+    with pytest.raises(PyMeshLabException, match="nothing"):
+        plugin.from_pymeshlab(mesh, ["nothing"])
+
+
+def test_simplify_a_mesh():
+    ms = sphere()
+    ms.compute_scalar_by_function_per_vertex(q="x + 2*y")
+    mesh = ms.current_mesh()
+    mesh.add_vertex_custom_point_attribute(np.ascontiguousarray(mesh.vertex_matrix()), "place")
+    before = plugin.from_pymeshlab(mesh, ["place"])
+    new, report = plugin.simplify(
+        mesh, max_edge_length=0.15, custom_attributes=["place"], return_report=True
+    )
+    assert same(before, plugin.from_pymeshlab(mesh, ["place"]))
+    vertices = new.vertex_matrix()
+    assert new.face_number() == report.topology_after.n_faces < len(before.faces)
+    assert np.abs(new.vertex_scalar_array() - vertices @ (1, 2, 0)).max() < 1e-12
+    assert np.abs(new.vertex_custom_point_attribute_matrix("place") - vertices).max() < 1e-12
+    assert (new.vertex_color_matrix() == mesh.vertex_color_matrix()[0]).all()
+    assert new.label() == mesh.label()
+    with pytest.raises(MeshError, match="current_mesh"):
+        plugin.simplify(ms, max_edge_length=0.15)
+
+
+# --- pipelines -----------------------------------------------------------------------------------
+
+
+def agree(ms):
+    """PyMeshLab's measures and our report say the same."""
+    theirs, ours = ms.get_topological_measures(), plugin.topology(ms.current_mesh())
+    assert theirs["is_mesh_two_manifold"] and ours.is_manifold
+    assert theirs["genus"] == ours.genus
+    assert theirs["number_holes"] == ours.n_boundary_loops
+    assert theirs["boundary_edges"] == ours.n_boundary_edges
+    assert theirs["connected_components_number"] == ours.n_components
+    assert theirs["edges_number"] == ours.n_edges
+    return ours
+
+
+@needs_data
+@pytest.mark.parametrize("name", ["face_libigl", "elephant_refined", "skull_yj"])
+def test_pipeline_on_a_real_mesh(name, tmp_path):
+    ms = MeshSet()
+    ms.load_new_mesh(str(data_dir() / "meshes" / f"{name}.ply"))
+    ms.meshing_remove_unreferenced_vertices()
+    before = agree(ms)
+    figures = ms.apply_filter(SIMPLIFY, maxedgelength=PercentageValue(1))
+    assert figures["faces_number"] < figures["faces_number_before"]
+    assert before.same_topology(agree(ms))
+    ms.apply_coord_taubin_smoothing(stepsmoothnum=2)
+    ms.save_current_mesh(str(tmp_path / "out.ply"))
+    ms.load_new_mesh(str(tmp_path / "out.ply"))
+    assert before.same_topology(agree(ms))
+
+
+def test_isosurface_filter():
+    x, y, z = np.mgrid[-1:1:40j, -1:1:40j, -1:1:40j]
+    torus = 0.3 - np.hypot(np.hypot(x, y) - 0.6, z)
+    ms = sphere()
+    figures = ms.generate_isosurface_by_marching_tetrahedra(volume=torus, meshname="torus")
+    assert ms.current_mesh_id() == 1 and ms.current_mesh().label() == "torus"
+    assert figures["faces_number"] == ms.current_mesh().face_number()
+    assert agree(ms).genus == 1
+    ms.apply_filter(SIMPLIFY, maxedgelength=PureValue(1.0))
+    assert agree(ms).genus == 1
+    empty = MeshSet()
+    plugin.isosurface_to_new_mesh(empty, volume=torus, isovalue=-0.1, spacing=(1, 2, 3))
+    assert empty.mesh_number() == 1
+
+
+# --- errors in PyMeshLab's words -------------------------------------------------------------------
+
+
+def test_wrong_parameters_have_the_messages_of_other_filters():
+    ms = sphere()
+    for value in (1.0, "1%"):
+        theirs = message_of(lambda v=value: ms.apply_filter(OTHER, targetlen=v))
+        ours = message_of(lambda v=value: ms.apply_filter(SIMPLIFY, maxedgelength=v))
+        assert ours == theirs.replace("targetlen", "maxedgelength")
+    theirs = message_of(lambda: ms.apply_filter(OTHER, nonsense=1))
+    ours = message_of(lambda: ms.apply_filter(SIMPLIFY, nonsense=1))
+    assert ours == theirs.replace(OTHER, SIMPLIFY)
+    theirs = message_of(lambda: MeshSet().apply_filter(OTHER))
+    assert message_of(lambda: MeshSet().apply_filter(SIMPLIFY)) == theirs.replace(OTHER, SIMPLIFY)
+    ours = message_of(lambda: ms.apply_filter(SIMPLIFY, blocked="no"), InvalidEnumException)
+    assert ours.startswith("Enum 'no' not found. Possible values are 'contract'; ")
+    assert "foldover" in message_of(lambda: ms.apply_filter(SIMPLIFY, foldover="x"))
+
+
+def test_no_faces_has_the_message_of_other_filters():
+    ms = sphere()
+    ms.meshing_remove_all_faces()
+    theirs = message_of(lambda: ms.apply_filter(OTHER))
+    assert message_of(lambda: ms.apply_filter(SIMPLIFY)) == theirs.replace(OTHER, SIMPLIFY)
+
+
+@pytest.mark.parametrize("name", ["targetfacenum", "targetperc", "qualitythr", "boundaryweight"])
+def test_parameters_of_the_quadric_mode_are_known(name):
+    if name not in plugin.FILTERS[SIMPLIFY].pending:
+        pytest.skip("the quadric mode is there")
+    message = message_of(lambda: sphere().apply_filter(SIMPLIFY, **{name: 1}))
+    assert name in message and "quadric" in message
+
+
+def test_bad_mesh_says_what_is_wrong():
+    ms = MeshSet()
+    ms.add_mesh(Mesh(np.eye(5, 3), np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])))
+    message = message_of(lambda: ms.apply_filter(SIMPLIFY))
+    assert message.startswith(f"Failed to apply filter: {SIMPLIFY}\nDetails: ")
+    assert "more than two faces" in message and "meshing_repair_non_manifold_edges" in message
+    assert ms.current_mesh().face_number() == 3
+    ms = MeshSet()
+    ours = message_of(lambda: ms.generate_isosurface_by_marching_tetrahedra(volume=np.eye(3)))
+    assert "shape" in ours
+    assert "volume" in message_of(lambda: ms.generate_isosurface_by_marching_tetrahedra())
+
+
+def test_other_filters_are_as_before():
+    ms = sphere()
+    assert ms.apply_filter("get_geometric_measures")["surface_area"] > 12
+    assert "targetlen" in ms.filter_parameter_values(OTHER)
+    with pytest.raises(PyMeshLabException, match="Filter does not exists"):
+        ms.apply_filter("no_such_filter")
+    with pytest.raises(TypeError, match="incompatible function arguments"):
+        ms.apply_filter()
+
+
+# --- help ------------------------------------------------------------------------------------------
+
+
+def test_filters_are_listed(capsys):
+    assert plugin.FILTERS.keys() <= set(pymeshlab.filter_list())
+    for call in (pymeshlab.print_filter_list, lambda: pymeshlab.search("topology_preserving")):
+        call()
+        assert SIMPLIFY in capsys.readouterr().out
+    pymeshlab.print_filter_parameter_list(SIMPLIFY)
+    assert "\tmaxedgelength : PercentageValue = 1%\n" in capsys.readouterr().out
+
+
+def test_page_and_help_tell_of_all_parameters():
+    page = PAGE.read_text()
+    for name, each in plugin.FILTERS.items():
+        assert f"## `{name}`" in page
+        for parameter in each.parameters.keys() - set(each.pending):
+            assert f"`{parameter}`" in page
+
+
+def test_filters_can_be_removed():
+    plugin.remove_filters()
+    try:
+        assert not hasattr(MeshSet, SIMPLIFY) and SIMPLIFY not in pymeshlab.filter_list()
+        ms = sphere()
+        assert plugin.simplify_current_mesh(ms, maxedgelength=LENGTH)["genus"] == 0
+        with pytest.raises(PyMeshLabException, match="does not exists"):
+            ms.apply_filter(SIMPLIFY)
+    finally:
+        plugin.add_filters()
+
+
+def test_missing_pymeshlab_names_the_extra():
+    code = (
+        "import sys; sys.modules['pymeshlab'] = None\n"
+        "try: import tetsimplify.plugins.pymeshlab\n"
+        "except ImportError as error: print(error)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'pip install "tetsimplify[pymeshlab]"' in run.stdout
+
+
+def test_page_example_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    program = "".join(re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL))
+    exec(compile(program, str(PAGE), "exec"), {})
+
+
+def test_doctests():
+    result = doctest.testmod(plugin)
+    assert result.attempted and not result.failed
