@@ -214,7 +214,7 @@ def _arrays(mesh: pymeshlab.Mesh, custom_attributes: Collection[str], normals: b
         of_faces["normal"] = _c(mesh.face_normal_matrix())
     for kind, data in (("vertex", of_vertices), ("face", of_faces)):
         if getattr(mesh, f"has_{kind}_color")():
-            data["color"] = _c(getattr(mesh, f"{kind}_color_matrix")())
+            data["color"] = _colors(mesh, kind)
         if getattr(mesh, f"has_{kind}_scalar")():
             data["scalar"] = getattr(mesh, f"{kind}_scalar_array")()
     if mesh.has_vertex_tex_coord():
@@ -233,6 +233,15 @@ def _arrays(mesh: pymeshlab.Mesh, custom_attributes: Collection[str], normals: b
             if values is not None:
                 data[CUSTOM + name] = values
     return MeshArrays(_c(mesh.vertex_matrix()), _c(mesh.face_matrix()), of_vertices, of_faces)
+
+
+def _colors(mesh: pymeshlab.Mesh, kind: str) -> NDArray[np.float64]:
+    """Colours, of little memory and in little time where nobody has set any."""
+    packed = getattr(mesh, f"{kind}_color_array")()
+    if len(packed) and (packed == packed[0]).all():
+        levels_of_one = int(packed[0]) >> np.array([16, 8, 0, 24]) & 255  # 0xAARRGGBB
+        return np.broadcast_to(levels_of_one / 255, (len(packed), 4))
+    return _c(getattr(mesh, f"{kind}_color_matrix")())
 
 
 @contextmanager
@@ -263,7 +272,7 @@ def _c(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _is_constant(rows: NDArray[Any]) -> bool:
-    return len(rows) > 0 and bool((rows == rows[0]).all())
+    return len(rows) > 0 and (rows.strides[0] == 0 or bool((rows == rows[0]).all()))
 
 
 # --- filters ---------------------------------------------------------------------------------

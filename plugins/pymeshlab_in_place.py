@@ -62,7 +62,13 @@ class Writer:
         n_new = len(result.vertices)
         is_gone = result.vertex_map < 0
         self._move(self._keys(np.where(is_gone, 10 * (n_new + 1), result.vertex_map + 1), unit))
-        if is_gone.any():
+        if not self.has_attributes["f"]:  # all at once, which is faster
+            far = f"{4 * (n_new + 1) * unit!r}"
+            terms = f"x0==x1||x1==x2||x2==x0||x0>{far}||x1>{far}||x2>{far}"
+            self.apply("compute_selection_by_condition_per_face", condselect=terms)
+            self.apply("meshing_remove_selected_faces")
+            self.apply("meshing_remove_unreferenced_vertices")
+        elif is_gone.any():
             self.apply("compute_selection_by_edge_length", threshold=4 * (n_new + 1) * unit)
             self.apply("meshing_remove_selected_faces")
         self.apply("meshing_remove_duplicate_vertices")

@@ -72,6 +72,12 @@ def test_too_many_corners(monkeypatch):
         tetsimplify.simplify(VERTICES, FACES, max_edge_length=1.0)
 
 
+@pytest.mark.parametrize("value", ["abc", (1, 2, "x"), (1, (2, 3), 3), (1, 2, 1j), (1, 2), None])
+def test_what_are_not_three_numbers(value):
+    with pytest.raises(tetsimplify.OptionError, match="spacing must be three finite numbers"):
+        tetsimplify.extract_isosurface(np.zeros((2, 2, 2)), 0.5, spacing=value)
+
+
 def test_messages_list_the_first_offenders():
     assert arrays.listed(np.arange(3)) == "0, 1, 2"
     assert arrays.listed(np.arange(9)) == "0, 1, 2, 3, 4, ... (9 in all)"

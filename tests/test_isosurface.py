@@ -712,8 +712,9 @@ def assert_real(mesh: Mesh, volume: Volume, spacing: NDArray, *, closed: bool) -
     assert models.areas(*mesh).min() > 0
     assert (mesh.vertices >= 0).all()
     assert (mesh.vertices <= spacing * (np.array(volume.shape) - 1)).all()
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
-    keys, counts = np.unique(edges @ [2**32, 1], return_counts=True)
+    after = np.roll(mesh.faces, -1, axis=1)
+    keys = np.minimum(mesh.faces, after).astype(np.int64) << 32 | np.maximum(mesh.faces, after)
+    keys, counts = np.unique(keys, return_counts=True)
     p, q = np.divmod(keys[counts == 1], 2**32)
     last = spacing * (np.array(volume.shape) - 1)
     sides = np.concatenate([mesh.vertices == 0, mesh.vertices == last], axis=1)

@@ -125,7 +125,10 @@ def as_volume(volume: Any) -> Any:
 
 def as_triple(name: str, values: ArrayLike, *, positive: bool = False) -> NDArray[np.float64]:
     """Cast three finite numbers, one for each axis."""
-    triple = np.asarray(values, dtype=np.float64)
+    try:
+        triple = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise OptionError(f"{name} must be three finite numbers, got {values!r}") from error
     if triple.shape != (3,) or not np.isfinite(triple).all():
         raise OptionError(f"{name} must be three finite numbers, got {values!r}")
     if positive and not (triple > 0).all():

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from data import data_dir, needs_data
 
 import tetsimplify
+from data import data_dir, needs_data
 from tetsimplify.errors import MeshError
 
 pymeshlab = pytest.importorskip("pymeshlab")
@@ -246,6 +246,31 @@ def test_texture_seam_neither_tears_nor_bleeds(tmp_path, monkeypatch):
     assert ms.get_topological_measures()["number_holes"] == 1  # the seam is welded
 
 
+def test_borders_of_several_textures_stay(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    vertices, faces, right = grid()
+    for name in "ab":
+        image.new("RGB", (4, 4)).save(tmp_path / f"{name}.png")
+    (tmp_path / "m.mtl").write_text("".join(f"newmtl {k}\nmap_Kd {k}.png\n" for k in "ab"))
+    lines = ["mtllib m.mtl"]
+    lines += [f"v {x} {y} {z}\nvt {x} {y}" for x, y, z in vertices]
+    for name, side in (("a", ~right), ("b", right)):
+        lines += [f"usemtl {name}"]
+        lines += ["f " + " ".join(f"{i}/{i}" for i in face) for face in faces[side] + 1]
+    (tmp_path / "m.obj").write_text("\n".join(lines))
+    ms = MeshSet()
+    ms.load_new_mesh(str(tmp_path / "m.obj"))
+    mesh = ms.current_mesh()
+    names = list(mesh.textures())
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    assert len(names) == 2 and list(mesh.textures()) == names
+    corners = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    texture = plugin.textures_of_faces(mesh)
+    assert np.array_equal(texture == texture.max(), corners[:, :, 0].mean(axis=1) > 0.5)
+    uv = mesh.wedge_tex_coord_matrix().reshape(-1, 3, 2)
+    assert np.abs(uv - corners[:, :, :2]).max() < 1e-6
+
+
 @pytest.mark.parametrize("selected", [True, None])
 def test_only_selected_faces_change(selected):
     ms = sphere()
@@ -385,7 +410,7 @@ def test_isosurface_filter():
     assert empty.mesh_number() == 1
 
 
-# --- errors in PyMeshLab's words -------------------------------------------------------------------
+# --- errors in PyMeshLab's words -----------------------------------------------------------------
 
 
 def test_wrong_parameters_have_the_messages_of_other_filters():
@@ -442,7 +467,7 @@ def test_other_filters_are_as_before():
         ms.apply_filter()
 
 
-# --- help ------------------------------------------------------------------------------------------
+# --- help ----------------------------------------------------------------------------------------
 
 
 def test_filters_are_listed(capsys):

@@ -96,6 +96,8 @@ def test_round_trip_is_exact(name):
 
 @pytest.mark.parametrize("name", ["plain", "vertex", "face", "texture"])
 def test_the_input_is_not_changed_and_all_is_kept(name):
+    if name == "face":
+        pytest.importorskip("scipy")  # which trimesh copies colours of faces with
     mesh = with_everything(name)
     before = mesh.copy()
     result = tetsimplify.simplify(mesh, max_edge_length=0.4)
