@@ -15,7 +15,7 @@ from tetsimplify.options import Options, Progress
 from tetsimplify.topology import TopologyReport, analyse
 
 if TYPE_CHECKING:
-    from tetsimplify.kernels.state import Scratch
+    from tetsimplify.kernels.state import Rules, Scratch
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`
 MARK_LIMIT = 2**30  # stamps are int32; they start anew beyond this
@@ -124,9 +124,7 @@ class Engine:
             if progress is not None:  # every sweep is half of what is still to do
                 progress("contract", 1.0 - 0.5**self.n_sweeps * (1.0 - 0.5 * last / n_faces))
         if self.rules.blocked == state.CONTRACT and self.tally("N_DEFERRED"):
-            n_contracted += kernels.sweep.unblock(
-                self._surface, self._scratch, self.rules, self._outer, colour
-            )
+            n_contracted += self._unblock(self.rules, colour, commit=True)
             self._renew_marks()
         self._scratch.tally[state.N_DEFERRED] = 0
         self.n_sweeps += 1
@@ -161,9 +159,9 @@ class Engine:
     def _remaining_edges(self) -> tuple[NDArray[np.int32], NDArray[np.str_]]:
         """The short edges that are left, and the reasons found when they were last tried."""
         surface, state = self._surface, kernels.state
-        if (surface.verdict == state.REMOVAL_LIMIT).any():
-            self._tell_obstructed_from_too_large()
         faces = np.flatnonzero(surface.face_state != state.SETTLED)
+        held = surface.verdict.reshape(-1, 3)[faces] == state.REMOVAL_LIMIT
+        self._tell_obstructed_from_too_large(faces[held.any(axis=1)])
         begins = (3 * faces[:, None] + np.arange(3)).reshape(-1)
         ends = (3 * faces[:, None] + (1, 2, 0)).reshape(-1)
         edges = np.column_stack([surface.corner_vertex[begins], surface.corner_vertex[ends]])
@@ -172,13 +170,22 @@ class Engine:
         edges, first = np.unique(np.sort(edges[is_short]), axis=0, return_index=True)
         return edges, np.array(state.OUTCOMES)[surface.verdict[begins[is_short][first]]]
 
-    def _tell_obstructed_from_too_large(self) -> None:
+    def _tell_obstructed_from_too_large(self, faces: NDArray[np.intp]) -> None:
         """Try the edges that the removal limit holds without it, as far as steps allow."""
+        if not len(faces):
+            return
+        state = kernels.state
+        self._scratch.lists[state.DEFERRED, : len(faces)] = faces
+        self._scratch.tally[state.N_DEFERRED] = len(faces)
+        most_steps = DECISION_STEPS[0] + DECISION_STEPS[1] * self.n_faces
         rules = self.rules._replace(
-            removal_limit2=np.inf,
-            max_steps=self.tally("N_STEPS") + DECISION_STEPS[0] + DECISION_STEPS[1] * self.n_faces,
+            removal_limit2=np.inf, max_steps=self.tally("N_STEPS") + most_steps
         )
-        kernels.sweep.find_obstructed(self._surface, self._scratch, rules, self._outer)
+        self._unblock(rules, state.SETTLED, commit=False)
+
+    def _unblock(self, rules: Rules, colour: int, *, commit: bool) -> int:
+        arguments = self._surface, self._scratch, rules, self._outer, colour, commit
+        return int(kernels.sweep.unblock(*arguments))
 
     def _renew_marks(self) -> None:
         if self.tally("STAMP") > MARK_LIMIT:

@@ -23,6 +23,8 @@ is obstructed.
 
 from typing import NamedTuple
 
+import numpy as np
+
 from tetsimplify.kernels.corners import DEAD, ahead, behind
 from tetsimplify.kernels.jit import cold_part, inlined
 from tetsimplify.kernels.outer import disagreement, vote
@@ -73,6 +75,10 @@ class Choice(NamedTuple):
     n_removed: int  # vertices that vanish with the removed lenses
     first_removed: int  # the first of them, which are linked by FOLLOWER
     loop_size: int  # edges of the boundary loop that v and u share afterwards, 0 if none
+
+
+# Below, integers that go into other functions are np.int64(...): for a literal, and for an
+# int32, these would be compiled a second time.
 
 
 @inlined
@@ -186,7 +192,8 @@ def _claim_hole(surface, scratch, rules, lens, vertex):
     """Claim the virtual neighbour of a vertex, if it has one."""
     if surface.loop[vertex] < 0:
         return True
-    return _claim(surface, scratch, rules, lens, surface.loop.size + surface.loop[vertex], -1)
+    virtual = np.int32(surface.loop.size + surface.loop[vertex])
+    return _claim(surface, scratch, rules, lens, virtual, np.int64(-1))
 
 
 @cold_part
@@ -328,11 +335,11 @@ def _grow(surface, scratch, rules, outer, corner):
         As of :func:`_keepable`.
     """
     lists, tally = scratch.lists, scratch.tally
-    refused = -1
+    refused = np.int64(-1)
     while True:
         n_growing = 0
-        growing = -1
-        forced = -1
+        growing = np.int64(-1)
+        forced = np.int64(-1)
         for lens in range(tally[N_LENSES]):
             if lists[STATUS, lens] == GROWING:
                 if lists[LAST, lens] == lists[CURSOR, lens]:
@@ -380,7 +387,7 @@ def _reason(status, other):
 def _best(surface, scratch, rules, outer, corner):
     """Choose the lens to keep when all of them are discs; results as of :func:`_grow`."""
     lists, n_lenses = scratch.lists, scratch.tally[N_LENSES]
-    best = -1
+    best = np.int64(-1)
     best_size = 0
     best_rank = 0
     reason = OBSTRUCTED
@@ -414,7 +421,7 @@ def _remove_others(surface, scratch, corner, kept, loop_size):
     across = _face_across(corner_vertex, next_corner, corner)
     if across >= 0:
         face_mark[across] = of_edge
-    n_doomed = 0
+    n_doomed = np.int64(0)
     for c in (corner, ahead(corner)):
         n_doomed = _doom(
             corner_vertex, next_corner, c, face_mark, first, of_edge, stays, doomed, n_doomed
@@ -424,7 +431,7 @@ def _remove_others(surface, scratch, corner, kept, loop_size):
     for lens in range(n_lenses):
         vertex = lists[FIRST, lens] if lens != kept else -1
         while vertex >= 0:
-            c = nodes[ENTRY, vertex]
+            c = np.int64(nodes[ENTRY, vertex])
             n_doomed = _doom(
                 corner_vertex, next_corner, c, face_mark, first, of_edge, stays, doomed, n_doomed
             )

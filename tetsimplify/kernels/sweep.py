@@ -69,7 +69,7 @@ def sweep(surface, scratch, rules, first, last, colour, retry):
 
 
 @kernel_in_place
-def unblock(surface, scratch, rules, outer, colour):
+def unblock(surface, scratch, rules, outer, colour, commit):
     """Contract at most one blocked edge of each of the faces put off.
 
     Parameters
@@ -78,39 +78,33 @@ def unblock(surface, scratch, rules, outer, colour):
         How to tell which lens to keep: None by region growing, else PATH or DISTANCE.
     colour : int
         As of :func:`sweep`; faces that were touched in the same sweep are left.
+    commit : bool
+        False to contract nothing, and only find out which of the edges that the removal limit
+        holds are obstructed under these rules.
 
     Returns
     -------
     int
         Number of contractions.
     """
+    wanted = NESTED if commit else REMOVAL_LIMIT
     n_contracted = 0
     for i in range(scratch.tally[N_DEFERRED]):
         f = scratch.lists[DEFERRED, i]
-        if surface.corner_vertex[3 * f] == DEAD or surface.face_state[f] == colour:
+        if surface.corner_vertex[3 * f] == DEAD or (commit and surface.face_state[f] == colour):
             continue
         costs = edge_costs(surface.vertices, surface.corner_vertex, f)
         for k in cheapest_first(costs):
             corner = 3 * f + k
             if costs[k] >= rules.max_length2:
                 break
-            if surface.verdict[corner] != NESTED:
+            if surface.verdict[corner] != wanted:
                 continue
-            outcome = contract_nested(surface, scratch, rules, outer, corner, colour, True)
-            if outcome == CONTRACTIBLE:
+            outcome = contract_nested(surface, scratch, rules, outer, corner, colour, commit)
+            if commit and outcome == CONTRACTIBLE:
                 n_contracted += 1
                 break
-            surface.verdict[corner] = outcome
+            if commit or outcome == OBSTRUCTED:
+                surface.verdict[corner] = outcome
     scratch.tally[N_DEFERRED] = 0
     return n_contracted
-
-
-@kernel_in_place
-def find_obstructed(surface, scratch, rules, outer):
-    """Find out which of the edges that the removal limit holds are obstructed under `rules`."""
-    for corner in range(surface.verdict.size):
-        is_open = surface.face_state[corner // 3] != SETTLED
-        if is_open and surface.verdict[corner] == REMOVAL_LIMIT:
-            outcome = contract_nested(surface, scratch, rules, outer, corner, SETTLED, False)
-            if outcome == OBSTRUCTED:
-                surface.verdict[corner] = OBSTRUCTED
