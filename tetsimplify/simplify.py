@@ -56,8 +56,9 @@ def simplify(
         its nested 3-cycles; leave it, as other programs do; or contract it and break the
         topology, the "standard" algorithm of the paper, which shows what goes wrong.
     placement : {"midpoint", "endpoint"}
-        Where the new vertex goes. Boundary vertices stay on the boundary either way. With
-        "endpoint" all vertices of the result are vertices of the input.
+        Where the new vertex goes. Boundary vertices stay where they are when the other end of
+        the edge is inside, unless that is locked. With "endpoint" all vertices of the result
+        are vertices of the input.
     removal_limit : float, optional
         How far from the middle of its edge a nested contraction may remove vertices; in the
         units of the vertices. None is 4 times `max_edge_length`; ``inf`` is the paper's
@@ -68,7 +69,8 @@ def simplify(
         topology is kept with each of them; only the first is fast.
     foldover : float, optional
         Largest change of a face normal in one contraction, in degrees. Other places along the
-        edge are tried before it is left. None is no limit.
+        edge are tried before it is left. None is no limit. Faces without height, which have no
+        normal, may turn.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
     repair : bool

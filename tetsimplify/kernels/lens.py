@@ -13,8 +13,8 @@ neighbouring c's:
                   u                        the plane and meet in the edge vu)
 
 The edge can be contracted exactly when every lens has a rim of four edges, all but the kept
-one are discs without holes, the kept one does not consist of two faces back to back,
-and a boundary loop that v and u lie on keeps three edges.
+one are discs without holes, the kept one does not consist of two faces back to back, and a
+boundary loop that v and u lie on runs along the kept one and keeps three edges there.
 
 A region that meets another one while it grows, or the rim of another one, has a rim of more
 than four edges: some 3-cycle does not separate, contraction would cut a handle, and the edge
