@@ -445,11 +445,13 @@ def test_what_is_no_manifold_is_refused_and_repaired(mesh, message):
 
 def test_lens_marks_start_anew(monkeypatch):
     """Stamps are int32; a run that would give too many of them goes on all the same."""
-    vertices, faces = strategies.adversarial_mesh(3)
     options = {"max_edge_length": 1e6, "foldover": None, "removal_limit": np.inf}
-    expected = tetsimplify.simplify(vertices, faces, **options)
-    monkeypatch.setattr("tetsimplify.engine.MARK_LIMIT", 5)
-    assert np.array_equal(tetsimplify.simplify(vertices, faces, **options).faces, expected.faces)
+    for seed in range(40):
+        mesh = strategies.adversarial_mesh(seed)
+        monkeypatch.setattr("tetsimplify.engine.STAMP_LIMIT", 2**30)
+        expected = tetsimplify.simplify(*mesh, **options)
+        monkeypatch.setattr("tetsimplify.engine.STAMP_LIMIT", 5)
+        assert np.array_equal(tetsimplify.simplify(*mesh, **options).faces, expected.faces)
 
 
 def test_pieces_of_a_sweep_make_no_difference(monkeypatch):

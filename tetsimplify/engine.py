@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tetsimplify.kernels.state import Rules, Scratch
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`
-MARK_LIMIT = 2**30  # stamps are int32; they start anew beyond this
+STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
 DECISION_STEPS = (100_000, 2)  # steps of region growing to tell obstructed from too large:
 # so many, and so many for each face
@@ -120,12 +120,10 @@ class Engine:
             n_contracted += kernels.sweep.sweep(
                 self._surface, self._scratch, self.rules, first, last, colour, retry
             )
-            self._renew_marks()
             if progress is not None:  # every sweep is half of what is still to do
                 progress("contract", 1.0 - 0.5**self.n_sweeps * (1.0 - 0.5 * last / n_faces))
         if self.rules.blocked == state.CONTRACT and self.tally("N_DEFERRED"):
             n_contracted += self._unblock(self.rules, colour, commit=True)
-            self._renew_marks()
         self._scratch.tally[state.N_DEFERRED] = 0
         self.n_sweeps += 1
         return n_contracted
@@ -187,12 +185,6 @@ class Engine:
         arguments = self._surface, self._scratch, rules, self._outer, colour, commit
         return int(kernels.sweep.unblock(*arguments))
 
-    def _renew_marks(self) -> None:
-        if self.tally("STAMP") > MARK_LIMIT:
-            self._scratch.mark.fill(0)
-            self._scratch.face_mark.fill(0)
-            self._scratch.tally[kernels.state.STAMP] = 0
-
     def _compact(self) -> None:
         """Drop the dead faces."""
         corner_vertex = np.empty(3 * self.n_faces, np.int32)
@@ -227,6 +219,7 @@ def _scratch(n_faces: int, n_coned: int) -> Scratch:
         point=np.zeros(4),
     )
     scratch.tally[state.N_LIVE] = n_faces
+    scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
     return scratch
 
 

@@ -66,7 +66,8 @@ class Scratch(NamedTuple):
 N_SIMPLE, N_NESTED, N_LENS_VERTICES, N_LENS_FACES, N_LIVE = 0, 1, 2, 3, 4
 STAMP, N_STEPS, N_DEFERRED = 5, 6, 7  # last stamp given, steps of region growing, faces put off
 LENS_STAMP, N_LENSES, CONE = 8, 9, 10  # of the lenses at hand, see lens.py
-TALLY_SIZE = 11
+STAMP_LIMIT = 11  # stamps are int32; they start anew beyond this
+TALLY_SIZE = 12
 
 PLACE = 3  # in `Scratch.point`: parameter of the new vertex along its edge
 

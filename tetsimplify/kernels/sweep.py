@@ -7,7 +7,7 @@ edge; `unblock` follows and does the nested contractions there.
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.cost import cheapest_first, edge_costs
-from tetsimplify.kernels.jit import kernel_in_place
+from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.state import (
     BLOCKED,
     CONTRACTIBLE,
@@ -17,7 +17,18 @@ from tetsimplify.kernels.state import (
     OBSTRUCTED,
     REMOVAL_LIMIT,
     SETTLED,
+    STAMP,
+    STAMP_LIMIT,
 )
+
+
+@part
+def _renew_stamps(scratch):
+    """Let the stamps start anew before they are too large for the marks."""
+    if scratch.tally[STAMP] > scratch.tally[STAMP_LIMIT]:
+        scratch.tally[STAMP] = 0
+        scratch.mark[:] = 0
+        scratch.face_mark[:] = 0
 
 
 @kernel_in_place
@@ -49,6 +60,7 @@ def sweep(surface, scratch, rules, first, last, colour, retry):
             surface.face_state[f] = SETTLED
             continue
         surface.face_state[f] = BLOCKED
+        _renew_stamps(scratch)
         is_nested = False
         for k in order:
             if costs[k] >= rules.max_length2:
@@ -100,6 +112,7 @@ def unblock(surface, scratch, rules, outer, colour, commit):
                 break
             if surface.verdict[corner] != wanted:
                 continue
+            _renew_stamps(scratch)
             outcome = contract_nested(surface, scratch, rules, outer, corner, colour, commit)
             if commit and outcome == CONTRACTIBLE:
                 n_contracted += 1
