@@ -1,6 +1,7 @@
 """Contraction against the oracle, on adversarial surfaces, in every mode."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -461,3 +462,14 @@ def test_pieces_of_a_sweep_make_no_difference(monkeypatch):
     pieces = tetsimplify.simplify(vertices, faces, max_edge_length=0.3)
     assert np.array_equal(pieces.faces, expected.faces)
     assert np.array_equal(pieces.vertices, expected.vertices)
+
+
+def test_several_threads_at_once():
+    volume = np.random.default_rng(5).normal(size=(24, 24, 24))
+    mesh = tetsimplify.extract_isosurface(volume, 0.0)
+    expected = tetsimplify.simplify(*mesh, max_edge_length=0.8)
+    with ThreadPoolExecutor(8) as pool:
+        runs = [pool.submit(tetsimplify.simplify, *mesh, max_edge_length=0.8) for _ in range(16)]
+        for run in runs:
+            assert np.array_equal(run.result().vertices, expected.vertices)
+            assert np.array_equal(run.result().faces, expected.faces)
