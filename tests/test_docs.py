@@ -76,4 +76,4 @@ def test_no_page_says_too_much():
     """Pages speak of the project, not of the machine that they were written on."""
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        assert not re.search(r"/work/|/tmp/|/root/|shared/data", text), name(page)
+        assert not re.search(r"/(tmp|root|home|mnt)/", text), name(page)

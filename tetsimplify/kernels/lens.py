@@ -28,7 +28,7 @@ import numpy as np
 from tetsimplify.kernels.corners import DEAD, ahead, behind
 from tetsimplify.kernels.jit import cold_part, inlined
 from tetsimplify.kernels.outer import disagreement, vote
-from tetsimplify.kernels.rings import forward_arc, is_boundary_edge, ordered_link
+from tetsimplify.kernels.rings import face_across, forward_arc, ordered_link
 from tetsimplify.kernels.state import (
     CONE,
     CONTRACTIBLE,
@@ -236,7 +236,7 @@ def _seed(surface, scratch, rules, corner):
             # the edge opposite may be on a boundary although no inner vertex is
             if end == begin + 1 and fan[begin] >= 0 and surface.loop[link[begin]] >= 0:
                 rim = ahead(fan[begin])
-                if is_boundary_edge(corner_vertex, surface.next_corner, rim):
+                if face_across(corner_vertex, surface.next_corner, rim) < 0:
                     if not _claim_hole(surface, scratch, rules, lens, link[begin]):
                         return False
     return True
@@ -418,7 +418,7 @@ def _remove_others(surface, scratch, corner, kept, loop_size):
     first = scratch.tally[LENS_STAMP]
     stays, of_edge = first + kept, first + n_lenses
     face_mark[corner // 3] = of_edge
-    across = _face_across(corner_vertex, next_corner, corner)
+    across = face_across(corner_vertex, next_corner, corner)
     if across >= 0:
         face_mark[across] = of_edge
     n_doomed = np.int64(0)
@@ -458,18 +458,6 @@ def _copy_fan(fan, begin, end, star):
             star[n] = fan[i]
             n += 1
     return n
-
-
-@cold_part
-def _face_across(corner_vertex, next_corner, corner):
-    """The other face of the edge that begins at `corner`, -1 on a boundary."""
-    u = corner_vertex[ahead(corner)]
-    c = next_corner[corner]
-    while c != corner:
-        if corner_vertex[behind(c)] == u:
-            return c // 3
-        c = next_corner[c]
-    return -1
 
 
 @cold_part

@@ -94,12 +94,12 @@ def forward_arc(corner_vertex, next_corner, corner, target, corners, slot):
 
 
 @cold_part
-def is_boundary_edge(corner_vertex, next_corner, corner):
-    """Whether the edge from `corner` to the next corner of its face has no other face."""
+def face_across(corner_vertex, next_corner, corner):
+    """The other face of the edge from `corner` to the next corner, -1 on a boundary."""
     target = corner_vertex[ahead(corner)]
     c = next_corner[corner]
     while c != corner:
         if corner_vertex[c] != DEAD and corner_vertex[behind(c)] == target:
-            return False
+            return c // 3
         c = next_corner[c]
-    return True
+    return -1
