@@ -605,8 +605,12 @@ def moved_onto(
     def frame(corners: NDArray[np.float64]) -> tuple[NDArray, float, NDArray]:
         centre = corners.mean(axis=0)
         size = float(np.linalg.norm(corners - centre))
+        if not (corners[0] - centre).any():
+            raise ValueError("a corner of the face lies in its middle")
         x = (corners[0] - centre) / np.linalg.norm(corners[0] - centre)
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        if not normal.any():  # the corners are on one line: any normal of that will do
+            normal = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
         normal /= np.linalg.norm(normal)
         return centre, size, np.stack([x, np.cross(normal, x), normal])
 
