@@ -33,7 +33,6 @@ with needs("pyvista"):
 Data = dict[str, NDArray[Any]]
 
 N_ATTRIBUTES = 11  # vtkDataSetAttributes::NUM_ATTRIBUTES: active scalars, vectors, normals, ...
-VTK_NORMALS = 2  # vtkDataSetAttributes::NORMALS
 
 
 class NotTrianglesError(MeshError, NotAllTrianglesError):

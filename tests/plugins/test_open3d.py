@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 
 import tetsimplify
 from data import data_dir, needs_data
+from test_docs import examples
 from tetsimplify.errors import MeshError, MissingExtraError, OptionError
 
 plugin = pytest.importorskip("tetsimplify.plugins.open3d", exc_type=ImportError)
@@ -252,8 +252,7 @@ def test_missing_open3d_names_the_extra():
 
 def test_page_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    program = "".join(re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL))
-    exec(compile(program, str(PAGE), "exec"), {})
+    exec(compile(examples(PAGE), str(PAGE), "exec"), {"__name__": "example"})
 
 
 def test_doctests():
