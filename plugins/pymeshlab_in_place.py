@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tetsimplify.plugins.pymeshlab_arrays import WEDGES, levels
 
 from tetsimplify import seams
 from tetsimplify.adapters import MeshArrays, needs
@@ -20,6 +21,8 @@ with needs("pymeshlab"):
     from pymeshlab import PercentageValue, PyMeshLabException
 
 Data = dict[str, NDArray[Any]]
+
+FAR = 2.0**600  # its square is infinite, its product with any other length here is not
 
 # as they are before filters are added to them
 apply_filter = pymeshlab.MeshSet.apply_filter
@@ -38,9 +41,10 @@ class Writer:
 
     PyMeshLab lets Python read a mesh, not write to it. Putting a new mesh in its place would
     change its id, leave references to it dangling and lose textures, custom attributes and
-    transform. So PyMeshLab's own filters do the work. Every vertex is moved to (new index, 0, 0),
-    and those that are gone far away; faces with long edges are removed, vertices in one place
-    unified, and what is left is moved to where it belongs::
+    transform. So PyMeshLab's own filters do the work. Every vertex is moved to the place on a
+    parabola that stands for its new index, and those that are gone far away. Then a face
+    vanishes exactly when its area is zero or infinite. Null faces are removed, vertices in one
+    place unified, and what is left is moved to where it belongs::
 
         a---b---c                  0---1---1            0-----1
          \ / \ /     b, c -> 1      \ / \ /              \   / \
@@ -55,49 +59,33 @@ class Writer:
         names = [key for key in filter_parameter_values(ms, "ply") if "__ca_" in key]
         self.has_attributes = {kind: any(f"__ca_{kind}" in key for key in names) for kind in "vf"}
 
-    def replace(self, result: seams.Seamed, old: MeshArrays, selected: Selection) -> None:
+    def replace(self, result: seams.Seamed, given: MeshArrays, selected: Selection) -> None:
         """Make the mesh that of a result."""
         # so large that where a vertex comes from is less than a rounding error
-        unit = 2.0 ** math.ceil(math.log2(np.abs(old.vertices).max() + 1) + 56)
-        n_new = len(result.vertices)
-        is_gone = result.vertex_map < 0
-        self._move(self._keys(np.where(is_gone, 10 * (n_new + 1), result.vertex_map + 1), unit))
-        if not self.has_attributes["f"]:  # all at once, which is faster
-            far = f"{4 * (n_new + 1) * unit!r}"
-            terms = f"x0==x1||x1==x2||x2==x0||x0>{far}||x1>{far}||x2>{far}"
-            self.apply("compute_selection_by_condition_per_face", condselect=terms)
-            self.apply("meshing_remove_selected_faces")
-            self.apply("meshing_remove_unreferenced_vertices")
-        elif is_gone.any():
-            self.apply("compute_selection_by_edge_length", threshold=4 * (n_new + 1) * unit)
-            self.apply("meshing_remove_selected_faces")
-        self.apply("meshing_remove_duplicate_vertices")
-        self._remove_flat_faces(result, old.faces)
+        unit = 2.0 ** math.ceil(math.log2(np.abs(given.vertices).max() + 1) + 54)
+        self._move(_keys(result.vertex_map, unit))
+        self.apply("meshing_remove_null_faces")
         self.apply("meshing_remove_unreferenced_vertices")
-        order = np.rint(self.mesh.vertex_matrix()[:, 0] / unit).astype(np.int64) - 1
-        if len(order) != n_new or self.mesh.face_number() != len(result.faces):
+        self.apply("meshing_remove_duplicate_vertices")
+        keys = self.mesh.vertex_matrix()
+        order = np.rint(keys[:, 2] / unit).astype(np.int64) - 1
+        if len(order) != len(result.vertices) or self.mesh.face_number() != len(result.faces):
             raise PyMeshLabException(
                 "the filters of PyMeshLab that this is made of "
                 "did not do as expected, and have damaged the current mesh"
             )
-        keys = self._keys(order + 1, unit)
+        if len(order) == 0:  # all gone, as can happen when the topology may be violated
+            return
         self._write_colors_and_scalars(keys, {k: x[order] for k, x in result.vertex_data.items()})
-        if "tex_coord" in result.vertex_data:
+        if "tex_coord" in result.vertex_data and not self.has_attributes["v"]:
             self._write_tex_coords(result.vertex_data["tex_coord"][order])
-        wedges = result.wedge_data.get("wedge_tex_coord")
-        if wedges is not None:
-            self._write_wedges(result.faces, wedges, order)
+        if WEDGES in result.wedge_data:
+            self._write_wedges(result.faces, result.wedge_data[WEDGES], order)
             self._move(keys)
         self._select(keys, order, result, selected)
         self._move(result.vertices[order])
         self.apply("compute_normal_per_face")
         self.apply("compute_normal_per_vertex")
-
-    @staticmethod
-    def _keys(index: NDArray[Any], unit: float) -> NDArray[np.float64]:
-        keys = np.zeros((len(index), 3), order="F")
-        keys[:, 0] = index * unit
-        return keys
 
     def _move(self, positions: NDArray[np.float64]) -> None:
         """Move all vertices, exactly."""
@@ -120,20 +108,6 @@ class Writer:
             self.ms.set_current_mesh(number)
             self.apply("delete_current_mesh")
             self.ms.set_current_mesh(current)
-
-    def _remove_flat_faces(self, result: seams.Seamed, faces: NDArray[np.int32]) -> None:
-        """Remove pairs of faces that lie on each other, which nested contractions can leave."""
-        if self.mesh.face_number() == len(result.faces):
-            return
-        a, b, c = np.append(result.vertex_map, np.int32(-1))[faces].T
-        left = np.flatnonzero(
-            (a != b) & (b != c) & (c != a) & (np.minimum(a, np.minimum(b, c)) >= 0)
-        )
-        flat = np.flatnonzero(~np.isin(left, result.face_map))
-        for chunk in np.array_split(flat[::-1], len(flat) // 100 + 1):  # from the last: all keep
-            condition = "||".join(f"(fi=={face})" for face in chunk)  # their numbers
-            self.apply("compute_selection_by_condition_per_face", condselect=condition)
-            self.apply("meshing_remove_selected_faces")
 
     def _write_colors_and_scalars(self, keys: NDArray[np.float64], data: Data) -> None:
         given = {k: v for k, v in (("color", "matrix"), ("scalar", "array")) if k in data}
@@ -223,8 +197,7 @@ class Writer:
 
     def _write_tex_coords(self, uv: NDArray[np.float64]) -> None:
         self._move(np.column_stack([uv, np.zeros(len(uv))]))
-        if not self.has_attributes["v"]:
-            self.apply("compute_texcoord_by_function_per_vertex", u="x", v="y")
+        self.apply("compute_texcoord_by_function_per_vertex", u="x", v="y")
 
     def _write_wedges(
         self, faces: NDArray[np.int32], uv: NDArray[np.float64], order: NDArray[np.int64]
@@ -253,6 +226,15 @@ class Writer:
             left &= ~self.mesh.face_selection_array()
 
 
+def _keys(index: NDArray[Any], unit: float) -> NDArray[np.float64]:
+    """Places on a parabola, no three on a line; -1 is so far away that areas overflow."""
+    keys = np.zeros((len(index), 3), order="F")
+    keys[:, 2] = (index + 1.0) * unit
+    keys[:, 0] = (index + 1.0) * keys[:, 2]
+    keys[index < 0] = 0.0, 0.0, FAR
+    return keys
+
+
 def textures_of_faces(mesh: pymeshlab.Mesh) -> NDArray[np.float64]:
     """The number of the texture of each face."""
     ms = pymeshlab.MeshSet()
@@ -260,8 +242,3 @@ def textures_of_faces(mesh: pymeshlab.Mesh) -> NDArray[np.float64]:
     apply_filter(ms, "compute_new_custom_scalar_attribute_per_face", name="texture", expr="ti")
     numbers: NDArray[np.float64] = ms.current_mesh().face_custom_scalar_attribute_array("texture")
     return numbers
-
-
-def levels(colors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Colours so that PyMeshLab, which keeps 8 bits and rounds down, takes the nearest ones."""
-    return (np.rint(255 * colors) + 0.25) / 255

@@ -265,10 +265,11 @@ class MeshAccessor:
         self._mesh = mesh
 
     def simplify(
-        self, max_edge_length: float, *, return_report: bool = False, **options: Any
+        self, max_edge_length: float | None = None, *, return_report: bool = False, **options: Any
     ) -> Any:
         """Contract every short edge; see :func:`tetsimplify.plugins.pyvista.simplify`."""
-        options["max_edge_length"] = max_edge_length
+        if max_edge_length is not None:
+            options["max_edge_length"] = max_edge_length
         return simplify(self._mesh, return_report=return_report, **options)
 
     def topology(self) -> TopologyReport:

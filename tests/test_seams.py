@@ -80,14 +80,30 @@ def test_the_end_of_a_seam_is_on_it_but_not_copied():
     assert topology(mesh.vertices[parts.origin], parts.faces).n_boundary_loops == 1
 
 
-def test_places_finds_exactly_equal_positions():
+def many_places() -> dict[str, np.ndarray]:
+    """Vertices of which some are in one place."""
     rng = np.random.default_rng(3)
-    vertices = rng.integers(-3, 3, (400, 3)) / 7
-    vertices[5] = -0.0
-    vertices[9] = 0.0
-    _, first, number = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    np.testing.assert_array_equal(seams.places(vertices), first[number.reshape(-1)])
-    np.testing.assert_array_equal(seams.places(rng.random((50, 3))), np.arange(50))
+    signed = rng.integers(-3, 3, (400, 3)) / 7
+    signed[5], signed[9] = -0.0, 0.0
+    fine = 1e16 * np.ones((400, 3))
+    fine[:, 1:] = rng.integers(0, 15, (400, 2))  # too fine to show beside the first coordinate
+    return {
+        "few": signed,
+        "all in one": np.ones((300, 3)),
+        "all apart": rng.random((500, 3)),
+        "grid": np.indices((8, 9, 10)).reshape(3, -1).T.astype(float),
+        "fine": fine,
+        "tiny": rng.integers(0, 9, (400, 3)) * 5e-324,
+        "none": np.empty((0, 3)),
+    }
+
+
+@pytest.mark.parametrize("name", many_places())
+def test_places_finds_exactly_equal_positions(name):
+    vertices = many_places()[name]
+    found = seams.places(vertices)
+    np.testing.assert_array_equal(vertices[found], vertices)
+    assert len(np.unique(found)) == len(np.unique(vertices, axis=0))
 
 
 # --- simplification ------------------------------------------------------------------------------

@@ -43,7 +43,9 @@ Array = NDArray[Any]
 Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
-HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+MIXING = (0.2718281828459045, 0.3141592653589793, 0.1618033988749895)  # of x, y, z to one number
+SPREADING = np.uint64(0x9E3779B97F4A7C15)  # odd, so that no two numbers become one
+MOST_THROWS = 32  # far more than a hash that tells the places apart needs
 WEDGE = "\0"  # before the names of wedge data among vertex data, which may have the same names
 
 
@@ -295,28 +297,40 @@ def _wedge(name: str) -> str:
 
 
 def places(vertices: NDArray[np.float64]) -> Indices:
-    """The lowest vertex in exactly the same place as each vertex."""
-    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # +0.0 makes -0.0 equal to 0.0
-    mixed = bits[:, 0] * HASH_FACTORS[0]
-    mixed += bits[:, 1] * HASH_FACTORS[1]
-    mixed += bits[:, 2] * HASH_FACTORS[2]
-    n_bits = max(len(bits), 2).bit_length() + 2  # so few share a slot, and the slots are few
-    slot = (mixed >> np.uint64(64 - n_bits)).view(np.int64)
-    result = np.arange(len(bits), dtype=np.int32)
-    last = np.empty(2**n_bits, np.int32)
-    last[slot] = result
-    is_last = last[slot] == result
-    if is_last.all():
-        return result
-    crowded = np.zeros(2**n_bits, np.bool_)
-    crowded[slot[~is_last]] = True
-    some = np.flatnonzero(crowded[slot])
-    keys, counts = np.unique(mixed[some], return_counts=True)
-    some = some[np.isin(mixed[some], keys[counts > 1])]
-    if len(some) == 0:
-        return result
-    _, first, which = np.unique(bits[some], axis=0, return_index=True, return_inverse=True)
-    result[some] = some[first[which.reshape(-1)]]
+    """For each vertex one in exactly the same place, the same one for all that are there.
+
+    The vertices are thrown into slots by a hash of their coordinates. The last one in a slot wins
+    it; those in its place are found with it, and all others are thrown again.
+    """
+    x, y, z = vertices.T
+    mixed = x * MIXING[0]
+    mixed += y * MIXING[1]
+    mixed += z * MIXING[2]
+    mixed += 0.0  # makes -0.0 equal to 0.0
+    keys = mixed.view(np.uint64)
+    result = np.arange(len(vertices), dtype=np.int32)
+    left = result
+    for _ in range(MOST_THROWS):
+        keys = keys * SPREADING
+        n_bits = len(left).bit_length() + 1
+        slots = (keys >> np.uint64(64 - n_bits)).view(np.int64)
+        entries = np.arange(len(left), dtype=np.int32)
+        winner_of_slot = np.empty(2**n_bits, np.int32)
+        winner_of_slot[slots] = entries
+        winners = winner_of_slot[slots]
+        losers = np.flatnonzero(winners != entries)
+        winners = winners[losers]
+        same = keys[winners] == keys[losers]
+        a, b = left[winners[same]], left[losers[same]]
+        same[same] = found = (vertices[a] == vertices[b]).all(axis=1)
+        result[b[found]] = a[found]
+        losers = losers[~same]
+        left, keys = left[losers], keys[losers]
+        if len(left) == 0:
+            return result
+    # many places have one hash, as where coordinates differ by less than sums of them can show
+    _, first, which = np.unique(vertices[left], axis=0, return_index=True, return_inverse=True)
+    result[left] = left[first[which.reshape(-1)]]
     return result
 
 

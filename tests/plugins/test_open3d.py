@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import doctest
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tetsimplify
 from data import data_dir, needs_data
-from test_docs import examples
-from tetsimplify.errors import MeshError, MissingExtraError, OptionError
+from tetsimplify.errors import MeshError, MissingExtraError
 
 plugin = pytest.importorskip("tetsimplify.plugins.open3d", exc_type=ImportError)
 import open3d as o3d  # noqa: E402
-
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "plugins" / "open3d.md"
 
 Legacy, Tensors = o3d.geometry.TriangleMesh, o3d.t.geometry.TriangleMesh
 LINEAR = np.array([[1.0, 2.0, -3.0], [0.5, 0.0, 1.0], [-1.0, 0.25, 0.0]])
@@ -117,16 +111,6 @@ def test_result_is_that_of_the_core():
     result = plugin.simplify(mesh, max_edge_length=0.3)
     assert np.array_equal(np.asarray(result.vertices), expected.vertices)
     assert np.array_equal(np.asarray(result.triangles), expected.faces)
-
-
-def test_report_and_options_pass_through():
-    mesh, report = plugin.simplify(
-        torus(), max_edge_length=0.3, placement="endpoint", return_report=True
-    )
-    assert report.options.placement == "endpoint"
-    assert report.topology_after.n_faces == len(mesh.triangles)
-    with pytest.raises(OptionError, match="placement"):
-        plugin.simplify(torus(), max_edge_length=0.3, placement="nowhere")
 
 
 # --- attributes ------------------------------------------------------------------------------
@@ -235,26 +219,3 @@ def test_missing_libusb_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "libusb_package", None)
     with pytest.raises(MissingExtraError, match=r"tetsimplify\[open3d\]"):
         plugin._load_libusb(ImportError("libusb-1.0.so.0: cannot open shared object file"))
-
-
-def test_missing_open3d_names_the_extra():
-    code = (
-        "import sys; sys.modules['open3d'] = None\n"
-        "try: import tetsimplify.plugins.open3d\n"
-        "except ImportError as error: print(error)"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 'pip install "tetsimplify[open3d]"' in run.stdout
-
-
-# --- documentation ---------------------------------------------------------------------------
-
-
-def test_page_example_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    exec(compile(examples(PAGE), str(PAGE), "exec"), {"__name__": "example"})
-
-
-def test_doctests():
-    result = doctest.testmod(plugin)
-    assert result.attempted and not result.failed

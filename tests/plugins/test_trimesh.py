@@ -9,7 +9,6 @@ import pytest
 
 import tetsimplify
 from data import data_dir, needs_data
-from test_docs import ROOT, examples
 from tetsimplify import MeshError, adapters
 
 trimesh = pytest.importorskip("trimesh")
@@ -231,12 +230,6 @@ def test_errors_are_in_the_words_of_trimesh():
 
 def test_an_empty_mesh():
     assert tetsimplify.simplify(trimesh.Trimesh(), max_edge_length=1).is_empty
-
-
-def test_the_examples_on_the_page_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    page = ROOT / "docs" / "plugins" / "trimesh.md"
-    exec(compile(examples(page), str(page), "exec"), {"__name__": "example"})
 
 
 @needs_data
