@@ -121,7 +121,11 @@ def test_invariants_after_every_sweep(blocked, placement, foldover, outer):
         vertices, faces = strategies.adversarial_mesh(seed)
         before = naive.summary(faces)
         options = Options(
-            some_length(vertices, faces, rng), blocked, placement, None, outer, foldover
+            max_edge_length=some_length(vertices, faces, rng),
+            blocked=blocked,
+            placement=placement,
+            outer=outer,
+            foldover=foldover,
         )
         engine = Engine(as_mesh(vertices, faces), options, np.zeros(len(vertices), bool))
         for _ in range(100):
@@ -228,13 +232,13 @@ def test_hole_in_a_torus_with_interleaved_rims():
 def test_foldover_guard_bounds_the_turn_of_every_face():
     volume = np.random.default_rng(1).normal(size=(5, 5, 5))
     vertices, faces = tetsimplify.extract_isosurface(volume, 0.0)
-    options = Options(0.6, foldover=40.0)
+    options = Options(max_edge_length=0.6, foldover=40.0)
     engine = Engine(as_mesh(vertices, faces), options, np.zeros(len(vertices), bool))
     turned = 0
     previous = normals_of(engine)
     for first in range(len(faces)):
-        arguments = engine._surface, engine._scratch, engine.rules, first, first + 1
-        if kernels.sweep.sweep(*arguments, kernels.state.STALE_EVEN, True) == 0:
+        surface = engine._surface, None, engine._scratch, engine.rules
+        if kernels.sweep.sweep(*surface, first, first + 1, kernels.state.STALE_EVEN, True) == 0:
             continue  # one contraction at a time, because two may turn the same face
         current = normals_of(engine)
         for face in current.keys() & previous.keys():

@@ -1,5 +1,6 @@
 """Topology-preserving simplification of triangle surfaces."""
 
+from tetsimplify.distance import SurfaceDistance, surface_distance
 from tetsimplify.errors import (
     FileError,
     MeshError,
@@ -10,6 +11,7 @@ from tetsimplify.errors import (
 )
 from tetsimplify.isosurface import extract_isosurface
 from tetsimplify.mesh import Mesh
+from tetsimplify.quality import QualityReport, quality
 from tetsimplify.repair import repair
 from tetsimplify.report import RepairReport, Simplification, SimplificationReport
 from tetsimplify.simplify import simplify
@@ -23,14 +25,18 @@ __all__ = [
     "MeshError",
     "MissingExtraError",
     "OptionError",
+    "QualityReport",
     "RepairReport",
     "Simplification",
     "SimplificationReport",
+    "SurfaceDistance",
     "TetsimplifyError",
     "TopologyReport",
     "VolumeError",
     "extract_isosurface",
+    "quality",
     "repair",
     "simplify",
+    "surface_distance",
     "topology",
 ]

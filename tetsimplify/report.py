@@ -48,6 +48,10 @@ class SimplificationReport:
     """What :func:`tetsimplify.simplify` did."""
 
     options: Options
+    stop: str
+    """The criterion that was reached: ``"target_faces"``, ``"keep_ratio"``, ``"max_error"``,
+    ``"max_quadric_error"`` or ``"max_edge_length"``; ``"exhausted"`` where none was, and topology
+    and guards allow no more."""
     n_simple: int
     """Contractions of edges that the link condition allows."""
     n_nested: int
@@ -57,6 +61,9 @@ class SimplificationReport:
     n_lens_faces: int
     """Faces removed in nested contractions."""
     n_sweeps: int
+    """In the last round."""
+    n_rounds: int
+    """How often all was done, with ever tighter bounds; 1 without ``max_error``."""
     seconds: dict[str, float]
     """Time of each stage."""
     topology_before: TopologyReport
@@ -66,10 +73,12 @@ class SimplificationReport:
     """Infinite for a mesh without faces."""
     shortest_edge_after: float
     remaining_edges: NDArray[np.int32] = field(repr=False)
-    """Shape (k, 2): every edge of the result that is shorter than ``max_edge_length``."""
+    """Shape (k, 2): every edge of the result that is shorter than ``max_edge_length``, none where
+    that is not given."""
     remaining_reasons: NDArray[np.str_] = field(repr=False)
     """Shape (k,): why each is left: ``"obstructed"`` (proven impossible), ``"removal_limit"``,
-    ``"foldover"``, ``"locked"``, or ``"skipped"`` with ``blocked="skip"``."""
+    ``"foldover"``, ``"normal_deviation"``, ``"shape"``, ``"locked"``, ``"error_bound"``,
+    ``"target_faces"`` (there were few enough), or ``"skipped"`` with ``blocked="skip"``."""
     repairs: RepairReport | None = None
     """What was repaired, None where repair was not asked for."""
 

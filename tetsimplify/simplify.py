@@ -18,28 +18,39 @@ from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.repair import repair as repair_mesh
 from tetsimplify.report import Simplification, SimplificationReport
 from tetsimplify.topology import topology
+from tetsimplify.within import run_within
 
 
 def simplify(
     vertices: Any,
     faces: ArrayLike | None = None,
     *,
-    max_edge_length: float,
+    max_edge_length: float | None = None,
+    target_faces: int | None = None,
+    keep_ratio: float | None = None,
+    max_error: float | None = None,
+    max_quadric_error: float | None = None,
+    cost: str = "auto",
+    placement: str = "auto",
     blocked: str = "contract",
-    placement: str = "midpoint",
     removal_limit: float | None = None,
     outer: str = "region",
+    boundary: str = "simplify",
+    feature_angle: float | None = None,
     foldover: float | None = DEFAULT_FOLDOVER,
+    normal_deviation: float | str | None = "auto",
+    shape: float | str | None = "auto",
     locked: ArrayLike | None = None,
     repair: bool = False,
     vertex_data: Mapping[str, ArrayLike] | None = None,
     face_data: Mapping[str, ArrayLike] | None = None,
     progress: Progress | None = None,
 ) -> Simplification:
-    """Contract every edge shorter than `max_edge_length` without changing the topology.
+    """Contract edges without changing the topology.
 
-    Where the ends of an edge have more common neighbours than the apexes of its two faces,
-    the inside of the nested 3-cycles is removed with the edge.
+    Every edge that is shorter than `max_edge_length`, or the edges that cost least until so many
+    faces are left or so much error is made. Where the ends of an edge have more common neighbours
+    than the apexes of its two faces, the inside of the nested 3-cycles is removed with the edge.
 
     Parameters
     ----------
@@ -49,36 +60,70 @@ def simplify(
     faces : array_like, shape (m, 3), integers
         A consistently oriented 2-manifold, with or without boundary, of any genus and any
         number of components.
-    max_edge_length : float
-        Shorter edges are contracted; in the units of the vertices.
+    max_edge_length : float, optional
+        Longer edges are left; in the units of the vertices. At least one of the criteria has to
+        be given: this one or one of the next four. The first that is reached stops.
+    target_faces : int, optional
+        So many faces are left, or one or two more.
+    keep_ratio : float, optional
+        The same as a part of the faces given.
+    max_error : float, optional
+        Distance: no point of the result is farther from the surface given, and no point of the
+        surface given farther from the result. This is proven afterwards; where it does not
+        hold, the contractions are done again with tighter bounds there.
+    max_quadric_error : float, optional
+        Distance: no vertex has a larger root mean squared distance from the planes of the faces
+        that were merged into it. Much faster than `max_error`, and no bound of the distance.
+    cost : {"auto", "length", "quadric"}
+        What makes an edge cheap: that it is short, or that the quadric error increases little
+        (Garland and Heckbert 1997). "auto" is "length" when `max_edge_length` is the only
+        criterion, else "quadric".
+    placement : {"auto", "midpoint", "quadric", "endpoint"}
+        Where the new vertex goes; "quadric" is the place of the least quadric error. "auto" is
+        "midpoint" when edges are judged by their length, else "quadric". Boundary vertices stay
+        where they are when the other end of the edge is inside, unless that is locked. With
+        "endpoint" all vertices of the result are vertices of the input.
     blocked : {"contract", "skip", "violate"}
         What to do with an edge that the link condition blocks: contract it with the inside of
         its nested 3-cycles; leave it, as other programs do; or contract it and break the
         topology, the "standard" algorithm of the paper, which shows what goes wrong.
-    placement : {"midpoint", "endpoint"}
-        Where the new vertex goes. Boundary vertices stay where they are when the other end of
-        the edge is inside, unless that is locked. With "endpoint" all vertices of the result
-        are vertices of the input.
     removal_limit : float, optional
         How far from the middle of its edge a nested contraction may remove vertices; in the
-        units of the vertices. None is 4 times `max_edge_length`; ``inf`` is the paper's
-        behaviour, which may remove a balloon on a thin neck.
+        units of the vertices. None is 4 times `max_edge_length`, or where that is not given 4
+        times the edge itself; ``inf`` is the paper's behaviour, which may remove a balloon on a
+        thin neck. By quadric error, what is removed counts with its whole distance.
     outer : {"region", "path", "distance"}
         How to tell what is outside of nested 3-cycles: by the number of vertices (growing
         regions in step), by the shortest paths along edges, by the Euclidean distance. The
         topology is kept with each of them; only the first is fast.
+    boundary : {"simplify", "keep", "lock"}
+        Boundary edges are contracted like others, and held by planes through them where there
+        are quadrics; or only where the boundary is straight, so that it stays the same curve;
+        or not at all.
+    feature_angle : float, optional
+        Edges between faces whose normals differ by more than this, in degrees, are held by planes
+        through them.
     foldover : float, optional
         Largest change of a face normal in one contraction, in degrees. Other places along the
         edge are tried before it is left. None is no limit. Faces without height, which have no
         normal, may turn.
+    normal_deviation : float, optional
+        Largest angle between the normal of a face and the mean normal of the faces given that were
+        merged into its vertices, in degrees, so that small turns do not add up. None is no
+        limit; "auto" is 90 by quadric error and None by length.
+    shape : float, optional
+        From 0 to 1, where 1 is an equilateral triangle. Triangles worse than this make an edge
+        dearer if they are worse than those around it were, and then they may not be needles.
+        None is no such thing; "auto" is 0.9 by quadric error and None by length.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
     repair : bool
         Repair a mesh that is no oriented 2-manifold first; see :func:`tetsimplify.repair`.
     vertex_data, face_data : mapping of names to arrays, optional
         Shapes (n, ...) and (m, ...). Floats at vertices are interpolated along contracted edges
-        as the positions are, so linear functions of the position stay exact; all other types
-        are labels, taken from the nearer end of the edge and never averaged.
+        (at the foot of the new vertex on the edge, so that linear functions of the position stay
+        exact where the new vertex is on the edge); all other types are labels, taken from the
+        nearer end of the edge and never averaged.
     progress : callable, optional
         Called as ``progress(stage, done)`` with `done` from 0 to 1. Raise from it to cancel.
 
@@ -86,7 +131,8 @@ def simplify(
     -------
     Simplification
         `vertices`, `faces`, `vertex_map` (old to new), `face_map` (new to old), `report`,
-        `vertex_data`, `face_data`. For a mesh object, an object of the same kind.
+        `vertex_data`, `face_data`. For a mesh object, an object of the same kind. What stopped it
+        is in ``report.stop``.
 
     Raises
     ------
@@ -94,14 +140,15 @@ def simplify(
         When the mesh is no consistently oriented 2-manifold, or not a mesh at all. The message
         says what is wrong where.
     OptionError
-        When an option has a wrong value.
+        When an option has a wrong value, or no criterion is given.
 
     Notes
     -----
     Topology is kept exactly when the kept side is bounded by one 4-cycle and all that is
-    removed is a disc; see the page on theory. Every short edge that is left is listed in
-    ``report.remaining_edges`` with its reason. With ``foldover=None, removal_limit=inf`` only
-    edges remain whose contraction is proven impossible.
+    removed is a disc; see the page on theory. Every edge shorter than `max_edge_length` that is
+    left is listed in ``report.remaining_edges`` with its reason. With ``foldover=None,
+    removal_limit=inf`` and no other criterion only edges remain whose contraction is proven
+    impossible.
 
     References
     ----------
@@ -111,6 +158,9 @@ def simplify(
 
     T. K. Dey, H. Edelsbrunner, S. Guha and D. V. Nekhayev. Topology preserving edge
     contraction. Publ. Inst. Math. (Beograd) 66(80), 1999, 23-45.
+
+    M. Garland and P. S. Heckbert. Surface simplification using quadric error metrics.
+    SIGGRAPH 1997, 209-216. https://doi.org/10.1145/258734.258849
 
     Examples
     --------
@@ -122,24 +172,39 @@ def simplify(
     >>> result = tetsimplify.simplify(*mesh, max_edge_length=1.0)
     >>> result.report.topology_after.same_topology(result.report.topology_before)
     True
+    >>> result = tetsimplify.simplify(*mesh, target_faces=1000)
+    >>> len(result.faces), result.report.stop
+    (1000, 'target_faces')
     """
+    given_options: dict[str, Any] = {
+        "max_edge_length": max_edge_length,
+        "target_faces": target_faces,
+        "keep_ratio": keep_ratio,
+        "max_error": max_error,
+        "max_quadric_error": max_quadric_error,
+        "cost": cost,
+        "placement": placement,
+        "blocked": blocked,
+        "removal_limit": removal_limit,
+        "outer": outer,
+        "boundary": boundary,
+        "feature_angle": feature_angle,
+        "foldover": foldover,
+        "normal_deviation": normal_deviation,
+        "shape": shape,
+    }
     if faces is None:
         return adapters.simplify(
             vertices,
-            max_edge_length=max_edge_length,
-            blocked=blocked,
-            placement=placement,
-            removal_limit=removal_limit,
-            outer=outer,
-            foldover=foldover,
             locked=locked,
             repair=repair,
             vertex_data=vertex_data,
             face_data=face_data,
             progress=progress,
+            **given_options,
         )
     clock = _Clock()
-    options = Options(max_edge_length, blocked, placement, removal_limit, outer, foldover)
+    options = Options(**given_options)
     with clock.stage("check"):
         given = as_mesh(vertices, faces)
         held = as_vertex_mask("locked", locked, len(given.vertices))
@@ -151,33 +216,38 @@ def simplify(
             of_vertices = {k: data[repaired.vertex_origin] for k, data in of_vertices.items()}
             given = Mesh(repaired.vertices, repaired.faces)
         engine = Engine(given, options, held)
-        shortest_before = kernels.result.shortest_edge(given.vertices, given.faces.reshape(-1))
+        shortest_before, _ = kernels.result.edge_extremes(given.vertices, given.faces.reshape(-1))
 
     with clock.stage("contract"):
-        engine.run(progress)
+        n_rounds = 1
+        if options.max_error is None:
+            engine.run(progress)
+        else:
+            engine, n_rounds = run_within(given, options, held, progress)
 
     with clock.stage("report"):
         weights = engine.vertex_weights() if of_vertices else None
-        result = engine.result()
+        result = engine.result
         vertex_map, face_map = result.vertex_map, result.face_map
         if repaired is not None:
             vertex_map = np.append(vertex_map, np.int32(-1))[repaired.vertex_map]
             face_map = repaired.face_map[face_map]
         after = topology(result.vertices, result.faces)
-        shortest_after = kernels.result.shortest_edge(result.vertices, result.faces.reshape(-1))
 
     report = SimplificationReport(
         options=options,
+        stop=result.stop,
         n_simple=engine.tally("N_SIMPLE"),
         n_nested=engine.tally("N_NESTED"),
         n_lens_vertices=engine.tally("N_LENS_VERTICES"),
         n_lens_faces=engine.tally("N_LENS_FACES"),
         n_sweeps=engine.n_sweeps,
+        n_rounds=n_rounds,
         seconds=clock.seconds,
         topology_before=engine.topology_before,
         topology_after=after,
         shortest_edge_before=float(shortest_before),
-        shortest_edge_after=float(shortest_after),
+        shortest_edge_after=float(result.shortest_edge),
         remaining_edges=result.remaining_edges,
         remaining_reasons=result.remaining_reasons,
         repairs=None if repaired is None else repaired.report,

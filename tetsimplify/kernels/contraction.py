@@ -4,15 +4,22 @@ Both ways tell what became of the edge. With `commit` False nothing is changed. 
 the new vertex get the state `colour`.
 """
 
+import numpy as np
+
 from tetsimplify.kernels.corners import DEAD, ahead
 from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition
 from tetsimplify.kernels.placement import find_place
+from tetsimplify.kernels.quadrics import error_bound, increase, merge_quadrics, weight
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
+    COST,
     DOOMED,
-    FOLDOVER,
+    ENOUGH,
+    ERROR,
+    ERROR_BOUND,
+    FACTOR,
     FOLLOWER,
     LOCKED,
     N_LENS_FACES,
@@ -25,12 +32,13 @@ from tetsimplify.kernels.state import (
     SETTLED,
     STAR_U,
     STAR_V,
+    TOO_DEAR,
     VIOLATE,
 )
 
 
 @part
-def contract_simple(surface, scratch, rules, corner, colour):
+def contract_simple(surface, quadrics, scratch, rules, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 
     NESTED when it does not; with ``blocked="violate"`` it does not matter.
@@ -46,18 +54,23 @@ def contract_simple(surface, scratch, rules, corner, colour):
         )
         if allowed != CONTRACTIBLE:
             return allowed
-    if not find_place(surface, scratch, rules, v, u, n_v, n_u):
-        return FOLDOVER
+    if scratch.tally[N_LIVE] - n_doomed < rules.min_faces:
+        return ENOUGH
+    placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+    if placed == CONTRACTIBLE and quadrics is not None:
+        placed = _judge(quadrics, scratch, rules, v, u)
+    if placed != CONTRACTIBLE:
+        return placed
     loop = max(surface.loop[v], surface.loop[u])
     if n_doomed == 1 and loop >= 0:
         surface.loop_size[loop] -= 1
-    _merge(surface, scratch, v, u, n_v, n_u, n_doomed, colour)
+    _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
     scratch.tally[N_SIMPLE] += 1
     return CONTRACTIBLE
 
 
 @inlined
-def contract_nested(surface, scratch, rules, outer, corner, colour, commit):
+def contract_nested(surface, quadrics, scratch, rules, outer, corner, colour, commit):
     """Contract the edge that begins at `corner` and remove the lenses beside the kept one.
 
     Where the link condition allows the contraction there is but one lens, which is kept.
@@ -69,17 +82,21 @@ def contract_nested(surface, scratch, rules, outer, corner, colour, commit):
     lens = keep_one_lens(surface, scratch, rules, outer, corner)
     if lens.outcome != CONTRACTIBLE:
         return lens.outcome
-    if not find_place(surface, scratch, rules, v, u, lens.n_v, lens.n_u):
-        return FOLDOVER
-    if not commit:
-        return CONTRACTIBLE
+    placed = find_place(surface, quadrics, scratch, rules, v, u, lens.n_v, lens.n_u)
+    if placed == CONTRACTIBLE and scratch.tally[N_LIVE] - lens.n_doomed < rules.min_faces:
+        placed = ENOUGH
+    if placed == CONTRACTIBLE and quadrics is not None:
+        _add_removed(surface, quadrics, scratch, lens.first_removed)
+        placed = _judge(quadrics, scratch, rules, v, u)
+    if placed != CONTRACTIBLE or not commit:
+        return placed
     if lens.loop_size > 0:
         surface.loop_size[surface.loop[v]] = lens.loop_size
     vertex = lens.first_removed
     while vertex >= 0:
         surface.merged_into[vertex] = -1
         vertex = scratch.nodes[FOLLOWER, vertex]
-    _merge(surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
+    _merge(surface, quadrics, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
     if scratch.tally[N_LENSES] > 1:
         scratch.tally[N_NESTED] += 1
         scratch.tally[N_LENS_VERTICES] += lens.n_removed
@@ -90,7 +107,37 @@ def contract_nested(surface, scratch, rules, outer, corner, colour, commit):
 
 
 @part
-def _merge(surface, scratch, v, u, n_v, n_u, n_doomed, colour):
+def _judge(quadrics, scratch, rules, v, u):
+    """Whether the place found, which need not be the best one, is within the bounds."""
+    error, terms = scratch.point[ERROR], quadrics.terms
+    if error > (weight(terms, v) + weight(terms, u)) * error_bound(quadrics, v, u):
+        return ERROR_BOUND
+    scratch.point[COST] = increase(terms, v, u, error) * scratch.point[FACTOR]
+    return (
+        TOO_DEAR if scratch.point[COST] > rules.max_cost and not rules.by_length else CONTRACTIBLE
+    )
+
+
+@part
+def _add_removed(surface, quadrics, scratch, vertex):
+    """Add to the error at the place what vanishes with removed lenses.
+
+    Every vertex counts with the weight of its planes and its whole distance to the new vertex,
+    which is more than the distance of the planes.
+    """
+    terms, vertices, point = quadrics.terms, surface.vertices, scratch.point
+    while vertex >= 0:
+        distance2 = 0.0
+        for axis in range(3):
+            distance2 += (vertices[vertex, axis] - point[axis]) ** 2
+        if distance2 > quadrics.max_error2[vertex]:
+            point[ERROR] = np.inf
+        point[ERROR] += distance2 * weight(terms, vertex)
+        vertex = scratch.nodes[FOLLOWER, vertex]
+
+
+@part
+def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
     """Bury the doomed faces and make one vertex, v, of v and u: move it, link its corners."""
     corner_vertex, lists = surface.corner_vertex, scratch.lists
     for i in range(n_doomed):
@@ -100,6 +147,8 @@ def _merge(surface, scratch, v, u, n_v, n_u, n_doomed, colour):
             corner_vertex[3 * f + k] = DEAD
     scratch.tally[N_LIVE] -= n_doomed
 
+    if quadrics is not None:
+        merge_quadrics(surface, quadrics, scratch, v, u)
     for axis in range(3):
         surface.vertices[v, axis] = scratch.point[axis]
     surface.merged_into[u] = v

@@ -1,15 +1,19 @@
-"""What it costs to contract the edges of a face."""
+"""What it costs to contract an edge: its squared length, or the quadric error."""
 
-from tetsimplify.kernels.jit import part
+import numpy as np
 
-
-@part
-def squared_length(vertices, a, b):
-    """Squared length of the edge ab."""
-    dx = vertices[a, 0] - vertices[b, 0]
-    dy = vertices[a, 1] - vertices[b, 1]
-    dz = vertices[a, 2] - vertices[b, 2]
-    return dx * dx + dy * dy + dz * dz
+from tetsimplify.kernels.corners import ahead
+from tetsimplify.kernels.geometry import squared_length
+from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.placement import fixed_place, least_error
+from tetsimplify.kernels.quadrics import error_bound, increase, sum_at, weight
+from tetsimplify.kernels.state import (
+    CONTRACTIBLE,
+    ERROR_BOUND,
+    LOCKED,
+    RANKED,
+    SETTLED,
+)
 
 
 @part
@@ -36,3 +40,55 @@ def cheapest_first(costs):
     if x <= z:
         return 1, 0, 2
     return (1, 2, 0) if y <= z else (2, 1, 0)
+
+
+@part
+def _ranked_cost(surface, quadrics, rules, a, b):
+    """Cost of the edge ab, infinite where something forbids its contraction, and what."""
+    vertices = surface.vertices
+    length2 = squared_length(vertices, a, b)
+    if length2 >= rules.max_length2:
+        return np.inf, CONTRACTIBLE
+    if surface.locked[a] and surface.locked[b]:
+        return np.inf, LOCKED
+    if quadrics is None:
+        return length2, CONTRACTIBLE
+    terms = quadrics.terms
+    x, y, z = (
+        vertices[b, 0] - vertices[a, 0],
+        vertices[b, 1] - vertices[a, 1],
+        vertices[b, 2] - vertices[a, 2],
+    )
+    fixed = fixed_place(surface, a, b)
+    error = least_error(sum_at(terms, vertices, a, b), x, y, z, fixed, rules)[4]
+    if error > (weight(terms, a) + weight(terms, b)) * error_bound(quadrics, a, b):
+        return np.inf, ERROR_BOUND
+    return length2 if rules.by_length else increase(terms, a, b, error), CONTRACTIBLE
+
+
+@kernel_in_place
+def rank(surface, quadrics, rules, cost, first, last):
+    """Bring the costs of the faces from `first` to `last` up to date.
+
+    Every edge is looked at from one face only, where it begins at its lower vertex. Its other
+    corner has an infinite cost.
+    """
+    for f in range(first, last):
+        state = surface.face_state[f]
+        if state == RANKED or state == SETTLED:
+            continue
+        surface.face_state[f] = RANKED
+        for corner in range(3 * f, 3 * f + 3):
+            a = surface.corner_vertex[corner]
+            b = surface.corner_vertex[ahead(corner)]
+            price, verdict = np.inf, CONTRACTIBLE
+            if is_ranked(surface.loop, a, b):
+                price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
+            cost[corner] = price
+            surface.verdict[corner] = verdict
+
+
+@part
+def is_ranked(loop, a, b):
+    """Whether an edge is looked at from the corner where it begins at a and leads to b."""
+    return a < b or (loop[a] >= 0 and loop[a] == loop[b])  # on a boundary there is no other corner

@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD, ahead, behind
+from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import cold_part, inlined
 from tetsimplify.kernels.outer import disagreement, vote
 from tetsimplify.kernels.rings import face_across, forward_arc, ordered_link
@@ -51,6 +52,7 @@ from tetsimplify.kernels.state import (
     N_STEPS,
     N_VERTICES,
     OBSTRUCTED,
+    REMOVAL2,
     REMOVAL_LIMIT,
     SLOT,
     STAMP,
@@ -180,7 +182,7 @@ def _claim(surface, scratch, rules, lens, vertex, corner):
     lists[LAST, lens] = vertex
     lists[N_VERTICES, lens] += 1
     if lists[STATUS, lens] != NO_DISC:
-        if _distance2(surface.vertices, vertex, scratch.point) > rules.removal_limit2:
+        if _distance2(surface.vertices, vertex, scratch.point) > scratch.point[REMOVAL2]:
             lists[STATUS, lens] = TOO_FAR
         elif surface.locked[vertex] and lists[STATUS, lens] == GROWING:
             lists[STATUS, lens] = HAS_LOCKED
@@ -211,6 +213,8 @@ def _seed(surface, scratch, rules, corner):
     v, u = corner_vertex[corner], corner_vertex[ahead(corner)]
     for axis in range(3):
         scratch.point[axis] = 0.5 * (surface.vertices[v, axis] + surface.vertices[u, axis])
+    length2 = squared_length(surface.vertices, v, u)
+    scratch.point[REMOVAL2] = max(rules.removal_limit2, rules.removal_edges2 * length2)
     n_lenses, lens_stamp = scratch.tally[N_LENSES], scratch.tally[LENS_STAMP]
     scratch.mark[v] = lens_stamp - 1
     scratch.mark[u] = lens_stamp - 1
@@ -314,7 +318,7 @@ def _keepable(surface, scratch, rules, corner, lens):
         c = lists[LINK_V, lists[CUT_V, k]]
         if k == lens or k == lens + 1:
             continue
-        if _distance2(surface.vertices, c, scratch.point) > rules.removal_limit2:
+        if _distance2(surface.vertices, c, scratch.point) > scratch.point[REMOVAL2]:
             return REMOVAL_LIMIT, 0
         if surface.locked[c]:
             return LOCKED, 0

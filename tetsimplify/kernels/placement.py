@@ -1,36 +1,125 @@
-"""Where the vertex goes that replaces an edge."""
+"""Where the vertex goes that replaces an edge.
 
-from tetsimplify.kernels.guards import NO_FOLDOVER_GUARD, turns_over
+Without quadrics the places of the rules are tried in turn, with quadrics the place where the error
+is least, and then the others, the cheapest first. The first that passes the guards is taken; it
+is left in `scratch.point`.
+"""
+
+from tetsimplify.kernels.guards import NO_GUARD, harm, turns_over
 from tetsimplify.kernels.jit import part
-from tetsimplify.kernels.state import PLACE, STAR_U, STAR_V
+from tetsimplify.kernels.quadrics import MAX_REACH, optimum, sum_at, value
+from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE, STAR_U, STAR_V
+
+FREE = -1.0  # no end of the edge has to stay
 
 
 @part
-def find_place(surface, scratch, rules, v, u, n_v, n_u):
-    """Try the placements in turn until one passes the guards; return whether one did.
+def fixed_place(surface, v, u):
+    """The end of the edge vu that has to stay: 0 for v, 1 for u, FREE for none.
 
     A locked end stays where it is; so does a boundary vertex when the other end is none.
-    The place is left in `scratch.point`.
     """
-    fixed = -1.0
-    if surface.locked[v] or (surface.loop[v] >= 0 and surface.loop[u] < 0):
-        fixed = 0.0
-    if surface.locked[u] or (fixed < 0.0 and surface.loop[u] >= 0 and surface.loop[v] < 0):
-        fixed = 1.0
+    locked, loop = surface.locked, surface.loop
+    if locked[u] or (loop[u] >= 0 and loop[v] < 0 and not locked[v]):
+        return 1.0
+    return 0.0 if locked[v] or (loop[v] >= 0 and loop[u] < 0) else FREE
+
+
+@part
+def find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
+    """Find a place that passes the guards: CONTRACTIBLE, or the guard that forbids the last."""
+    if quadrics is None:
+        return _first_place(surface, scratch, rules, v, u, n_v, n_u)
+    return _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+
+
+@part
+def _first_place(surface, scratch, rules, v, u, n_v, n_u):
+    """The first of the places of the rules that folds nothing over."""
+    fixed = fixed_place(surface, v, u)
     vertices, corner_vertex, point = surface.vertices, surface.corner_vertex, scratch.point
     star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
     cos = rules.cos_foldover
     for place in rules.places:
-        t = place if fixed < 0.0 else fixed
+        t = place if fixed == FREE else fixed
         point[PLACE] = t
         for axis in range(3):
             a, b = vertices[v, axis], vertices[u, axis]
             point[axis] = a if t == 0.0 else b if t == 1.0 else a + t * (b - a)
-        if cos <= NO_FOLDOVER_GUARD:
-            return True
+        if cos <= NO_GUARD:
+            return CONTRACTIBLE
         if not turns_over(vertices, corner_vertex, star_v, n_v, v, point, cos):
             if not turns_over(vertices, corner_vertex, star_u, n_u, u, point, cos):
-                return True
-        if fixed >= 0.0:
-            return False
-    return False
+                return CONTRACTIBLE
+        if fixed != FREE:
+            break
+    return FOLDOVER
+
+
+@part
+def least_error(q, x, y, z, fixed, rules):
+    """The best place for an edge with the quadric q, by the error alone.
+
+    Parameters
+    ----------
+    x, y, z : float
+        The edge, from v to u.
+    fixed : float
+        The place that is given, or FREE.
+
+    Returns
+    -------
+    px, py, pz : float
+        The place, relative to v.
+    place : float
+        Its parameter along the edge.
+    error : float
+    """
+    if fixed != FREE:
+        return fixed * x, fixed * y, fixed * z, fixed, value(q, fixed * x, fixed * y, fixed * z)
+    if rules.optimum:
+        px, py, pz = optimum(q, 0.5 * x, 0.5 * y, 0.5 * z)
+        dx, dy, dz = px - 0.5 * x, py - 0.5 * y, pz - 0.5 * z
+        length2 = x * x + y * y + z * z
+        if dx * dx + dy * dy + dz * dz <= MAX_REACH * MAX_REACH * length2:
+            along = px * x + py * y + pz * z
+            place = min(max(along / length2, 0.0), 1.0) if length2 > 0.0 else 0.5
+            return px, py, pz, place, value(q, px, py, pz)
+    best, least = (
+        rules.places[0],
+        value(q, rules.places[0] * x, rules.places[0] * y, rules.places[0] * z),
+    )
+    for t in rules.places[1:]:
+        error = value(q, t * x, t * y, t * z)
+        if error < least:
+            best, least = t, error
+    return best * x, best * y, best * z, best, least
+
+
+@part
+def _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
+    """The place of least error, or the cheapest of the places of the rules, that harms nothing."""
+    vertices, point = surface.vertices, scratch.point
+    q = sum_at(quadrics.terms, vertices, v, u)
+    ox, oy, oz = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+    x, y, z = vertices[u, 0] - ox, vertices[u, 1] - oy, vertices[u, 2] - oz
+    fixed = fixed_place(surface, v, u)
+    px, py, pz, point[PLACE], point[ERROR] = least_error(q, x, y, z, fixed, rules)
+    tried = -1.0
+    while True:
+        point[0], point[1], point[2] = ox + px, oy + py, oz + pz
+        if px == x and py == y and pz == z:  # ends stay what they are to the last bit
+            point[0], point[1], point[2] = vertices[u, 0], vertices[u, 1], vertices[u, 2]
+        harmed = harm(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+        if harmed == CONTRACTIBLE or fixed != FREE:
+            break
+        least = -1.0  # the others in the order of their errors
+        for t in rules.places:
+            error = value(q, t * x, t * y, t * z)
+            if error > tried and (least < 0.0 or error < least):
+                least, point[PLACE] = error, t
+        if least < 0.0:
+            break
+        tried = point[ERROR] = least
+        px, py, pz = point[PLACE] * x, point[PLACE] * y, point[PLACE] * z
+    return harmed

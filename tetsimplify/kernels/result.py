@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import squared_length
+from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel, kernel_in_place
 
 
@@ -83,15 +83,12 @@ def count_loop_edges(loop, n_loops):
 
 
 @kernel_in_place
-def shortest_edge(vertices, corner_vertex):
-    """Length of the shortest edge, infinite when there is none."""
-    shortest2 = np.inf
+def edge_extremes(vertices, corner_vertex):
+    """Lengths of the shortest and of the longest edge; infinite and 0 when there is none."""
+    shortest2, longest2 = np.inf, 0.0
     for f in range(corner_vertex.size // 3):
         a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
-        shortest2 = min(
-            shortest2,
-            squared_length(vertices, a, b),
-            squared_length(vertices, b, c),
-            squared_length(vertices, c, a),
-        )
-    return np.sqrt(shortest2)
+        for p, q in ((a, b), (b, c), (c, a)):
+            length2 = squared_length(vertices, p, q)
+            shortest2, longest2 = min(shortest2, length2), max(longest2, length2)
+    return np.sqrt(shortest2), np.sqrt(longest2)

@@ -5,7 +5,7 @@ vertex ahead of the corner to the one behind it.
 """
 
 from tetsimplify.kernels.corners import DEAD, ahead, behind
-from tetsimplify.kernels.jit import cold_part
+from tetsimplify.kernels.jit import cold_part, kernel_in_place
 
 
 @cold_part
@@ -103,3 +103,22 @@ def face_across(corner_vertex, next_corner, corner):
             return c // 3
         c = next_corner[c]
     return -1
+
+
+@kernel_in_place
+def boundary_neighbours(corner_vertex, next_corner, loop, before, after):
+    """Find the vertices before and after each boundary vertex on its loop.
+
+    Parameters
+    ----------
+    loop : int32 (n,)
+        Boundary loop of each vertex, -1 inside.
+    before, after : int32 (n,), out
+        Left as they are for vertices inside.
+    """
+    for corner in range(corner_vertex.size):
+        a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
+        if loop[a] >= 0 and loop[a] == loop[b]:
+            if face_across(corner_vertex, next_corner, corner) < 0:
+                after[a] = b
+                before[b] = a

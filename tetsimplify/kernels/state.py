@@ -9,11 +9,19 @@ import numpy as np
 
 # States of a face. A sweep passes over settled faces, and over the faces that it has touched
 # itself: these carry its own colour and are its freeze; the next sweep has the other colour.
-SETTLED, BLOCKED, STALE_EVEN, STALE_ODD = 0, 1, 2, 3
+# Where costs are kept, faces whose costs are up to date are RANKED, and only these are looked at.
+SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED = 0, 1, 2, 3, 4
 
-# What becomes of an edge that is to be contracted. NESTED: the link condition blocks it.
-CONTRACTIBLE, OBSTRUCTED, REMOVAL_LIMIT, FOLDOVER, LOCKED, NESTED = 0, 1, 2, 3, 4, 5
-OUTCOMES = ("contractible", "obstructed", "removal_limit", "foldover", "locked", "skipped")
+# What becomes of an edge that is to be contracted. NESTED: the link condition blocks it. ENOUGH:
+# there would be fewer faces than asked for. TOO_DEAR: it costs more than the sweep allows.
+CONTRACTIBLE, OBSTRUCTED, REMOVAL_LIMIT, LOCKED, NESTED, ENOUGH, TOO_DEAR = 0, 1, 2, 3, 4, 5, 6
+ERROR_BOUND, FOLDOVER, NORMAL_DEVIATION, SHAPE = 7, 8, 9, 10
+# What is told of an edge that is left. One that could be contracted is left when there were few
+# enough faces, one that the link condition blocks when those are skipped.
+REASONS = (
+    *("target_faces", "obstructed", "removal_limit", "locked", "skipped", "target_faces"),
+    *("target_faces", "error_bound", "foldover", "normal_deviation", "shape"),
+)
 
 # What to do with an edge that the link condition blocks.
 CONTRACT, SKIP, VIOLATE = 0, 1, 2
@@ -37,13 +45,28 @@ class Surface(NamedTuple):
     merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
 
 
+class Quadrics(NamedTuple):
+    """What the vertices stand for in quadric modes; see quadrics.py. None in the others."""
+
+    terms: np.ndarray  # float64 (n, 10): quadric of each vertex, relative to it
+    normals: np.ndarray  # float64 (n, 4): sums of the original normals, by area, and of the areas
+    max_error2: np.ndarray  # float64 (n,): largest mean squared distance allowed
+
+
 class Rules(NamedTuple):
     """The policies of a run."""
 
     max_length2: float  # edges shorter than the root of this are contracted
+    max_cost: float  # where costs are kept: edges below this are contracted in this sweep
+    by_length: bool  # where costs are kept: they are squared lengths, not quadric errors
+    min_faces: int  # so many faces are left
     blocked: int  # CONTRACT, SKIP or VIOLATE
     removal_limit2: float  # how far from the edge vertices may be removed, squared
+    removal_edges2: float  # the same in lengths of the edge; the larger one counts
     cos_foldover: float  # smallest cosine between the normals of a face before and after
+    cos_deviation: float  # the same for the normals of the faces given
+    shape: float  # triangles worse than this, and than those around were, make an edge dearer
+    optimum: bool  # try where the quadric is least first
     places: np.ndarray  # float64 (k,): placements to try, as parameters along the edge
     max_steps: int  # steps of region growing after which `removal_limit` is the answer
 
@@ -59,7 +82,7 @@ class Scratch(NamedTuple):
     face_mark: np.ndarray  # int32 (m,): stamps of faces
     nodes: np.ndarray  # int32 (3, n + n_loops): what is known of vertices for a while, below
     lists: np.ndarray  # int32 (N_LISTS, m + 2): lists, below
-    point: np.ndarray  # float64 (4,): middle of the edge, then the new vertex and its PLACE
+    point: np.ndarray  # float64: middle of the edge, then the new vertex; and more, below
 
 
 # Places in `Scratch.tally`: what has been done, and what is at hand.
@@ -69,7 +92,10 @@ LENS_STAMP, N_LENSES, CONE = 8, 9, 10  # of the lenses at hand, see lens.py
 STAMP_LIMIT = 11  # stamps are int32; they start anew beyond this
 TALLY_SIZE = 12
 
-PLACE = 3  # in `Scratch.point`: parameter of the new vertex along its edge
+# In `Scratch.point`: parameter of the new vertex along its edge; quadric error at it; factor for
+# the shapes of the triangles there; cost of it all; how far vertices may be removed, squared.
+PLACE, ERROR, FACTOR, COST, REMOVAL2 = 3, 4, 5, 6, 7
+POINT_SIZE = 8
 
 # Rows of `Scratch.nodes`.
 SLOT = 0  # sparse set: place of a vertex in some list

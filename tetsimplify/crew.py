@@ -1,0 +1,72 @@
+"""Threads that share work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from tetsimplify.errors import OptionError
+from tetsimplify.options import Progress
+
+Result = TypeVar("Result")
+
+
+class Crew:
+    """Threads that share work, part by part, and tell how far they have come.
+
+    The parts are the same for any number of threads, and so are the results.
+
+    Parameters
+    ----------
+    threads : int or None
+        How many; None for all that the process may use.
+    progress : callable, optional
+        Called as ``progress(name, done)`` with `done` from 0 to 1. Raise from it to cancel.
+    name : str
+        What the work is called there.
+    n_tasks : int
+        How many tasks there will be.
+
+    Raises
+    ------
+    OptionError
+        When `threads` is no positive integer.
+    """
+
+    def __init__(
+        self,
+        threads: int | None,
+        progress: Progress | None = None,
+        name: str = "",
+        n_tasks: int = 1,
+    ) -> None:
+        if threads is None:
+            can_tell = hasattr(os, "sched_getaffinity")
+            threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise OptionError(f"threads must be a positive integer, got {threads!r}")
+        self._threads = threads
+        self._progress = progress
+        self._name = name
+        self._n_tasks = n_tasks
+        self._n_done = 0
+
+    def share(self, task: Callable[[slice], Result], n_items: int, at_once: int) -> list[Result]:
+        """Do a task for so many items at once; return what comes of each part, in their order."""
+        parts = [slice(k, min(k + at_once, n_items)) for k in range(0, n_items, at_once)]
+        results = []
+        with ThreadPoolExecutor(self._threads) as pool:
+            try:
+                for result in pool.map(task, parts):
+                    results.append(result)
+                    self._tell(self._n_done + len(results) / len(parts))
+            finally:  # where something was raised, above all by `progress`
+                pool.shutdown(cancel_futures=True)
+        self._n_done += 1
+        return results
+
+    def _tell(self, n_done: float) -> None:
+        if self._progress is not None:
+            self._progress(self._name, n_done / self._n_tasks)

@@ -1,0 +1,211 @@
+r"""Quadric errors (Garland and Heckbert 1997): squared distances from planes, summed by area.
+
+The quadric of a vertex stands for the planes of all faces that have been merged into it. At a
+place y, relative to the vertex itself, it is
+
+    Q(y) = y' A y + 2 b' y + c,     A = sum of w n n'
+
+with the normal n and the weight w, the area, of each plane. Relative to the vertex: so a
+mesh far from the origin loses nothing, a quadric that is new has b = 0 and c = 0, and on a plane Q
+stays zero to the last bits. The trace of A is the sum of the areas, so Q / trace(A) is a mean
+squared distance.
+"""
+
+import numpy as np
+
+from tetsimplify.kernels.corners import ahead, behind
+from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.rings import face_across
+from tetsimplify.kernels.state import ERROR
+
+N_TERMS = 10
+
+# The optimum is held to the middle of the edge by a spring of this part of the weight: in
+# directions in which the planes do not decide, the middle does. So the solution is always well
+# conditioned, and triangles on flat and on weakly curved parts come out well shaped.
+STABILITY = 1e-3
+# So often the optimum is computed anew with the spring at the last one.
+REFINEMENTS = 4
+# Farther than so many lengths of the edge from its middle no optimum is believed.
+MAX_REACH = 2.0
+
+
+@part
+def sum_at(terms, vertices, v, u):
+    """The quadrics of v and u together, relative to v: A by rows of its upper half, b, c."""
+    axx, axy, axz = terms[u, 0], terms[u, 1], terms[u, 2]
+    ayy, ayz, azz = terms[u, 3], terms[u, 4], terms[u, 5]
+    bx, by, bz = terms[u, 6], terms[u, 7], terms[u, 8]
+    dx = vertices[v, 0] - vertices[u, 0]
+    dy = vertices[v, 1] - vertices[u, 1]
+    dz = vertices[v, 2] - vertices[u, 2]
+    gx = axx * dx + axy * dy + axz * dz
+    gy = axy * dx + ayy * dy + ayz * dz
+    gz = axz * dx + ayz * dy + azz * dz
+    return (
+        axx + terms[v, 0],
+        axy + terms[v, 1],
+        axz + terms[v, 2],
+        ayy + terms[v, 3],
+        ayz + terms[v, 4],
+        azz + terms[v, 5],
+        bx + gx + terms[v, 6],
+        by + gy + terms[v, 7],
+        bz + gz + terms[v, 8],
+        terms[u, 9] + (gx + 2.0 * bx) * dx + (gy + 2.0 * by) * dy + (gz + 2.0 * bz) * dz
+        + terms[v, 9],
+    )  # fmt: skip
+
+
+@part
+def value(q, x, y, z):
+    """The quadric q at a place relative to its vertex."""
+    axx, axy, axz, ayy, ayz, azz, bx, by, bz, c = q
+    error = (
+        x * (axx * x + 2.0 * (axy * y + axz * z + bx))
+        + y * (ayy * y + 2.0 * (ayz * z + by))
+        + z * (azz * z + 2.0 * bz)
+        + c
+    )
+    return max(error, 0.0)
+
+
+@part
+def weight(terms, v):
+    """The sum of the weights of the planes of v."""
+    return terms[v, 0] + terms[v, 3] + terms[v, 5]
+
+
+@part
+def increase(terms, v, u, error):
+    """How much more the error is than those of v and u alone."""
+    return max(error - terms[v, 9] - terms[u, 9], 0.0)
+
+
+@part
+def error_bound(quadrics, v, u):
+    """The largest mean squared distance that both v and u allow."""
+    return min(quadrics.max_error2[v], quadrics.max_error2[u])
+
+
+@part
+def optimum(q, x, y, z):
+    """Where q is least, held by a spring at the place given where the planes do not decide.
+
+    Again and again, with the spring at what came out: so what the planes do decide becomes as good
+    as exact, and what they do not decide hardly moves.
+    """
+    axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
+    spring = STABILITY * (axx + ayy + azz)
+    if spring <= 0.0:
+        return x, y, z
+    # (A + spring I) = L D L', by elimination
+    d1 = axx + spring
+    l21, l31 = axy / d1, axz / d1
+    d2 = ayy + spring - l21 * axy
+    e32 = ayz - l31 * axy
+    l32 = e32 / d2
+    d3 = azz + spring - l31 * axz - l32 * e32
+    for _ in range(REFINEMENTS):
+        gx = axx * x + axy * y + axz * z + bx
+        gy = axy * x + ayy * y + ayz * z + by - l21 * gx
+        gz = axz * x + ayz * y + azz * z + bz - l31 * gx - l32 * gy
+        gz = gz / d3
+        gy = gy / d2 - l32 * gz
+        gx = gx / d1 - l21 * gy - l31 * gz
+        x, y, z = x - gx, y - gy, z - gz
+    return x, y, z
+
+
+@part
+def merge_quadrics(surface, quadrics, scratch, v, u):
+    """Make of v and u, which are still where they were, what stands for both at the new place."""
+    terms, normals, vertices = quadrics.terms, quadrics.normals, surface.vertices
+    q = sum_at(terms, vertices, v, u)
+    axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
+    x = scratch.point[0] - vertices[v, 0]
+    y = scratch.point[1] - vertices[v, 1]
+    z = scratch.point[2] - vertices[v, 2]
+    for k in range(6):
+        terms[v, k] += terms[u, k]
+    terms[v, 6] = bx + axx * x + axy * y + axz * z
+    terms[v, 7] = by + axy * x + ayy * y + ayz * z
+    terms[v, 8] = bz + axz * x + ayz * y + azz * z
+    terms[v, 9] = scratch.point[ERROR]
+    for k in range(4):
+        normals[v, k] += normals[u, k]
+    quadrics.max_error2[v] = error_bound(quadrics, v, u)
+
+
+@part
+def _add_plane(terms, v, scale, x, y, z):
+    """Add the plane through v with a normal of any length; scale times its square is the weight."""
+    terms[v, 0] += scale * x * x
+    terms[v, 1] += scale * x * y
+    terms[v, 2] += scale * x * z
+    terms[v, 3] += scale * y * y
+    terms[v, 4] += scale * y * z
+    terms[v, 5] += scale * z * z
+
+
+@part
+def _area_vector(vertices, a, b, c):
+    """Normal of a face, as long as its area."""
+    ox, oy, oz = vertices[a, 0], vertices[a, 1], vertices[a, 2]
+    px, py, pz = vertices[b, 0] - ox, vertices[b, 1] - oy, vertices[b, 2] - oz
+    qx, qy, qz = vertices[c, 0] - ox, vertices[c, 1] - oy, vertices[c, 2] - oz
+    return 0.5 * (py * qz - pz * qy), 0.5 * (pz * qx - px * qz), 0.5 * (px * qy - py * qx)
+
+
+@kernel_in_place
+def add_faces(vertices, corner_vertex, terms, normals):
+    """Add the plane of each face to the quadrics of its vertices, and its normal to theirs."""
+    for f in range(corner_vertex.size // 3):
+        a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
+        x, y, z = _area_vector(vertices, a, b, c)
+        area = np.sqrt(x * x + y * y + z * z)
+        scale = 1.0 / area if area > 0.0 else 0.0
+        for v in (a, b, c):
+            _add_plane(terms, v, scale, x, y, z)
+            normals[v, 0] += x
+            normals[v, 1] += y
+            normals[v, 2] += z
+            normals[v, 3] += area
+
+
+@kernel_in_place
+def add_creases(surface, terms, boundary_weight, feature_weight, cos_feature):
+    """Hold boundary and feature edges by planes through them, upright on their faces.
+
+    Parameters
+    ----------
+    boundary_weight, feature_weight : float
+        Weight of a plane, in squared lengths of the edge.
+    cos_feature : float
+        Edges whose faces have normals with a smaller cosine are features; -1 for none.
+    """
+    vertices, corner_vertex, loop = surface.vertices, surface.corner_vertex, surface.loop
+    for corner in range(corner_vertex.size):
+        a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
+        if cos_feature <= -1.0 and (loop[a] < 0 or loop[a] != loop[b]):
+            continue
+        x, y, z = _area_vector(vertices, a, b, corner_vertex[behind(corner)])
+        square = x * x + y * y + z * z
+        if square == 0.0:
+            continue
+        scale = boundary_weight / square
+        across = face_across(corner_vertex, surface.next_corner, corner)
+        if across >= 0:
+            first = 3 * across
+            ox, oy, oz = _area_vector(
+                vertices, corner_vertex[first], corner_vertex[first + 1], corner_vertex[first + 2]
+            )
+            cosine = x * ox + y * oy + z * oz
+            if cosine >= cos_feature * np.sqrt(square * (ox * ox + oy * oy + oz * oz)):
+                continue
+            scale = feature_weight / square
+        ex = vertices[b, 0] - vertices[a, 0]
+        ey = vertices[b, 1] - vertices[a, 1]
+        ez = vertices[b, 2] - vertices[a, 2]
+        for v in (a, b):
+            _add_plane(terms, v, scale, y * ez - z * ey, z * ex - x * ez, x * ey - y * ex)
