@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify.distance import SMALLEST_TOLERANCE, Target, exceeds
+from tetsimplify.distance import SMALLEST_TOLERANCE, exceeds
 from tetsimplify.engine import Engine, Result
 from tetsimplify.errors import OptionError
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
+from tetsimplify.targets import Target
 
 FIRST_BOUND = 0.6  # of the limit: the quadric error that is allowed in the first round
 SLACK = 0.02  # of the limit: so much nearer a face may be and be reported still

@@ -22,20 +22,20 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from simplify import (
+from common import (
     CLOCKS,
     Row,
     Seconds,
     as_markdown,
     as_rich,
     gyroid,
-    length_that_keeps,
     machine,
     one_core,
     timed,
     version_of,
 )
+from rich.console import Console
+from simplify import length_that_keeps
 
 import tetsimplify
 from tetsimplify import Mesh

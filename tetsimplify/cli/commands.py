@@ -1,4 +1,4 @@
-"""The commands: isosurface, simplify, info and demo."""
+"""The commands: isosurface, simplify, info, distance and demo."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import signal
 import sys
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
@@ -32,12 +32,20 @@ from tetsimplify.mesh import Mesh
 
 MESH_SUFFIXES = " ".join(MESH_FORMATS)
 VOLUME_SUFFIXES = " ".join(VOLUME_FORMATS)
+CRITERIA = "What stops it: the first of these that is reached, at least one is needed"
+CONTRACTIONS = "Which edges go, and where the new vertex is"
+GUARDS = "What is held"
 VOLUME_OPTIONS = "Volumes"
+NUMBERS = {
+    "foldover": "an angle in degrees",
+    "normal_deviation": "an angle in degrees",
+    "shape": "a number from 0 to 1",
+}
 
 app = typer.Typer(
     name="tetsimplify",
-    help="Extract surfaces from voxel volumes and contract every short edge of triangle "
-    "meshes without ever changing their topology.",
+    help="Extract surfaces from voxel volumes and simplify triangle meshes without ever "
+    "changing their topology.",
     epilog="Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
@@ -124,24 +132,70 @@ def simplify(
     ],
     output: Output,
     max_edge_length: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="LENGTH|PERCENT",
             help="Contract shorter edges: a length in the units of the mesh, or a percentage "
             "of the median edge length such as 120%.",
+            rich_help_panel=CRITERIA,
         ),
-    ],
-    blocked: Annotated[
+    ] = None,
+    target_faces: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Leave so many faces.", rich_help_panel=CRITERIA),
+    ] = None,
+    keep_ratio: Annotated[
         str | None,
-        typer.Option(help="Edges that the link condition blocks: contract, skip or violate."),
+        typer.Option(
+            metavar="R|PERCENT",
+            help="Leave such a part of the faces: 0.15 or 15%.",
+            rich_help_panel=CRITERIA,
+        ),
+    ] = None,
+    max_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH|PERCENT",
+            help="Distance between both surfaces, proven: a length, or a percentage of the "
+            "diagonal of the bounding box such as 0.1%.",
+            rich_help_panel=CRITERIA,
+        ),
+    ] = None,
+    max_quadric_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH|PERCENT",
+            help="Mean distance of each vertex from the planes merged into it, likewise; fast, "
+            "and no bound of the distance.",
+            rich_help_panel=CRITERIA,
+        ),
+    ] = None,
+    cost: Annotated[
+        str | None,
+        typer.Option(
+            help="What makes an edge cheap: length, quadric or auto.",
+            rich_help_panel=CONTRACTIONS,
+        ),
     ] = None,
     placement: Annotated[
-        str | None, typer.Option(help="Where the new vertex goes: midpoint or endpoint.")
+        str | None,
+        typer.Option(
+            help="Where the new vertex goes: midpoint, quadric, endpoint or auto.",
+            rich_help_panel=CONTRACTIONS,
+        ),
+    ] = None,
+    blocked: Annotated[
+        str | None,
+        typer.Option(
+            help="Edges that the link condition blocks: contract, skip or violate.",
+            rich_help_panel=CONTRACTIONS,
+        ),
     ] = None,
     outer: Annotated[
         str | None,
         typer.Option(
-            help="How to tell what is outside of nested 3-cycles: region, path or distance."
+            help="How to tell what is outside of nested 3-cycles: region, path or distance.",
+            rich_help_panel=CONTRACTIONS,
         ),
     ] = None,
     removal_limit: Annotated[
@@ -149,12 +203,48 @@ def simplify(
         typer.Option(
             metavar="LENGTH|Nx|inf",
             help="How far from its edge a nested contraction may remove vertices: a length, "
-            "a multiple of the edge length such as 4x, or inf.",
+            "a multiple of --max-edge-length such as 4x, or inf.",
+            rich_help_panel=GUARDS,
+        ),
+    ] = None,
+    boundary: Annotated[
+        str | None,
+        typer.Option(
+            help="Boundary edges: simplify them, keep the curve, or lock them.",
+            rich_help_panel=GUARDS,
+        ),
+    ] = None,
+    feature_angle: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEGREES",
+            help="Hold edges between faces whose normals differ by more.",
+            rich_help_panel=GUARDS,
         ),
     ] = None,
     foldover: Annotated[
         str | None,
-        typer.Option(metavar="DEGREES|off", help="Largest turn of a face in one contraction."),
+        typer.Option(
+            metavar="DEGREES|off",
+            help="Largest turn of a face in one contraction.",
+            rich_help_panel=GUARDS,
+        ),
+    ] = None,
+    normal_deviation: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEGREES|off",
+            help="Largest turn of a face in all contractions together.",
+            rich_help_panel=GUARDS,
+        ),
+    ] = None,
+    shape: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X|off",
+            help="Avoid triangles of worse shape: from 0 to 1, which is equilateral.",
+            rich_help_panel=GUARDS,
+        ),
     ] = None,
     repair: Annotated[
         bool, typer.Option("--repair", help="Make the mesh an oriented manifold first.")
@@ -169,30 +259,39 @@ def simplify(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Contract every edge shorter than --max-edge-length and keep the topology.
+    """Contract edges until a criterion is reached, and keep the topology.
 
     A volume is turned into the surface at --level first.
     """
     with session("simplify", as_json=as_json, quiet=quiet, debug=debug) as this:
         check_target(output)
-        number, is_relative = values.parse_edge_length(max_edge_length)
-        options: dict[str, Any] = {"blocked": blocked, "placement": placement, "outer": outer}
-        options = {name: value for name, value in options.items() if value is not None}
-        if foldover is not None:
-            options["foldover"] = values.parse_foldover(foldover)
-        if removal_limit is not None:
-            values.parse_removal_limit(removal_limit, number)  # complain before any work
+        lengths = {
+            "max_edge_length": max_edge_length,
+            "max_error": max_error,
+            "max_quadric_error": max_quadric_error,
+        }
+        numbers = {"foldover": foldover, "normal_deviation": normal_deviation, "shape": shape}
+        others = {
+            "target_faces": target_faces,
+            "keep_ratio": keep_ratio and values.parse_ratio("--keep-ratio", keep_ratio),
+            "cost": cost,
+            "placement": placement,
+            "blocked": blocked,
+            "outer": outer,
+            "boundary": boundary,
+            "feature_angle": feature_angle,
+        }
+        wanted = _Wanted(
+            lengths={k: values.parse_length(_dashed(k), v) for k, v in lengths.items() if v},
+            removal_limit=removal_limit,
+            others={name: value for name, value in others.items() if value is not None}
+            | {k: values.parse_or_off(_dashed(k), v, NUMBERS[k]) for k, v in numbers.items() if v},
+        )
+        wanted.check()
 
         volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
         mesh = _read(this, source, level, key, spacing, volume_options)
-        length = number
-        if is_relative:
-            lengths = edge_lengths(mesh)
-            length = number * float(np.median(lengths)) if len(lengths) else 0.0
-        if removal_limit is not None:
-            options["removal_limit"] = values.parse_removal_limit(removal_limit, length)
-
-        result = _simplify(this, mesh, max_edge_length=length, repair=repair, **options)
+        result = _simplify(this, mesh, repair=repair, **wanted.options(mesh))
         _write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
             {
@@ -213,23 +312,69 @@ def info(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Tell the topology of a mesh, its edge lengths, and what keeps it from being a manifold."""
+    """Tell the topology of a mesh, its quality, and what keeps it from being a manifold."""
     with session("info", as_json=as_json, quiet=quiet, debug=debug) as this:
         with this.stage("read"):
             surface = read_mesh(mesh)
         found = _topology(this, surface)
         lengths = edge_lengths(surface)
+        shapes = _quality(this, surface)
         defects = tables.defect_table(found)
         this.finish(
             {
                 **_header(this, mesh),
                 "topology": tables.topology_as_dict(found),
                 "edge_lengths": tables.lengths_as_dict(lengths),
+                "quality": shapes.as_dict(),
                 "seconds": this.seconds,
             },
             tables.topology_table("Topology", mesh=found),
             tables.lengths_table(lengths),
+            tables.quality_table(shapes),
             *([] if defects is None else [defects]),
+        )
+
+
+@app.command()
+def distance(
+    a: Annotated[Path, typer.Argument(help=f"Mesh to read: {MESH_SUFFIXES}")],
+    b: Annotated[Path, typer.Argument(help="Mesh to compare it with.")],
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH|PERCENT",
+            help="What the bounds of the largest distance may differ by: a length, or a "
+            "percentage of the diagonal of the bounding box of A.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Measure the distance between two surfaces, both ways."""
+    with session("distance", as_json=as_json, quiet=quiet, debug=debug) as this:
+        given = tolerance and values.parse_length("--tolerance", tolerance)
+        with this.stage("read"):
+            first, second = read_mesh(a), read_mesh(b)
+        diagonal = _diagonal(first)
+        number, is_relative = given or (None, False)
+        if number is not None and is_relative:
+            number *= diagonal
+
+        from tetsimplify.distance import surface_distance
+
+        with this.stage("distance"):
+            found = surface_distance(first, second, tolerance=number, progress=this.progress)
+        this.finish(
+            {
+                **_header(this, a),
+                "other": b,
+                "distance": tables.distance_as_dict(found),
+                "diagonal": diagonal,
+                "seconds": this.seconds,
+            },
+            tables.distance_table(found, diagonal),
+            tables.seconds_table(this.seconds),
         )
 
 
@@ -278,6 +423,58 @@ def demo(
             tables.headline(result.report),
             _wrote(this),
         )
+
+
+class _Wanted(NamedTuple):
+    """What `simplify` is asked to do, before the mesh is known."""
+
+    lengths: dict[str, tuple[float, bool]]
+    """Numbers, and whether they are parts of a length of the mesh."""
+    removal_limit: str | None
+    others: dict[str, Any]
+
+    def check(self) -> None:
+        """Complain before any work."""
+        from tetsimplify.options import CRITERIA as NAMES
+        from tetsimplify.options import Options
+
+        options = self._options({name: number for name, (number, _) in self.lengths.items()})
+        if not options.keys() & set(NAMES):
+            raise OptionError(f"give at least one of {', '.join(map(_dashed, NAMES))}")
+        Options(**options)
+
+    def options(self, mesh: Mesh) -> dict[str, Any]:
+        """The options of the library for a mesh."""
+        lengths = {}
+        for name, (number, is_relative) in self.lengths.items():
+            unit = 1.0
+            if is_relative:
+                unit = _median_edge(mesh) if name == "max_edge_length" else _diagonal(mesh)
+            lengths[name] = number * unit
+        return self._options(lengths)
+
+    def _options(self, lengths: dict[str, float]) -> dict[str, Any]:
+        options = {**lengths, **self.others}
+        if self.removal_limit is not None:
+            length = lengths.get("max_edge_length")
+            options["removal_limit"] = values.parse_removal_limit(self.removal_limit, length)
+        return options
+
+
+def _dashed(name: str) -> str:
+    """An option of the library as one of the command line."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _median_edge(mesh: Mesh) -> float:
+    lengths = edge_lengths(mesh)
+    return float(np.median(lengths)) if len(lengths) else 0.0
+
+
+def _diagonal(mesh: Mesh) -> float:
+    """The diagonal of the bounding box of the faces."""
+    corners = mesh.vertices[mesh.faces.reshape(-1)]
+    return float(np.linalg.norm(np.ptp(corners, axis=0))) if len(corners) else 0.0
 
 
 def _header(this: Session, source: Path | str) -> dict[str, Any]:
@@ -351,6 +548,13 @@ def _topology(this: Session, mesh: Mesh) -> Any:
 
     with this.stage("topology"):
         return topology(*mesh)
+
+
+def _quality(this: Session, mesh: Mesh) -> Any:
+    from tetsimplify.quality import quality
+
+    with this.stage("quality"):
+        return quality(*mesh)
 
 
 def _write(this: Session, path: Path, mesh: Mesh) -> None:

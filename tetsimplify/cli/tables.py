@@ -11,6 +11,8 @@ from rich import box
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from tetsimplify.distance import SurfaceDistance
+    from tetsimplify.quality import QualityReport
     from tetsimplify.report import SimplificationReport
     from tetsimplify.topology import TopologyReport
 
@@ -32,6 +34,7 @@ COUNTS = {
     "n_boundary_loops": "boundary loops",
     "n_boundary_edges": "boundary edges",
 }
+STOPS = {"exhausted": "topology and guards", "max_edge_length": "edge length"}
 FIRST = 10  # defects that are listed one by one
 
 
@@ -122,10 +125,49 @@ def lengths_table(lengths: NDArray[np.float64]) -> Table:
     return made
 
 
+def quality_table(report: QualityReport) -> Table:
+    """The criteria that tell most, and what would be ideal."""
+    ratio = report.radius_ratio.mean() if report.n_faces else 0.0
+    angle = report.min_angle.min(initial=np.inf) if report.n_faces else 0.0
+    made = table("Quality", "", "value", "ideal")
+    made.add_row("mean radius ratio", counted(float(ratio)), "1")
+    made.add_row("smallest angle", f"{angle:.6g}°", "60°")
+    made.add_row("topological criterion", counted(report.topological_criterion), "0")
+    return made
+
+
+def distance_as_dict(distance: SurfaceDistance) -> dict[str, Any]:
+    """Bounds and means of both directions together, and of each."""
+    names = ("lower", "upper", "mean", "rms")
+    parts = {"": distance, "a_to_b": distance.a_to_b, "b_to_a": distance.b_to_a}
+    found = {
+        part: {name: getattr(each, name) for name in names} for part, each in parts.items()
+    }
+    return {**found.pop(""), **found, "tolerance": distance.tolerance}
+
+
+def distance_table(distance: SurfaceDistance, diagonal: float) -> Table:
+    """Largest and mean distances, also as parts of a diagonal."""
+    made = table("Distance", "", "from A to B", "from B to A", "both", "% of diagonal")
+    rows = {
+        "largest, at least": "lower",
+        "largest, at most": "upper",
+        "mean": "mean",
+        "root mean square": "rms",
+    }
+    for words, name in rows.items():
+        both = getattr(distance, name)
+        one_way = (getattr(each, name) for each in (distance.a_to_b, distance.b_to_a))
+        part = f"{100 * both / diagonal:.4g}" if diagonal else "-"
+        made.add_row(words, *map(counted, one_way), counted(both), part)
+    return made
+
+
 def simplification_as_dict(report: SimplificationReport) -> dict[str, Any]:
     """What a simplification did."""
     return {
         "options": asdict(report.options),
+        "stop": report.stop,
         "topology_before": topology_as_dict(report.topology_before),
         "topology_after": topology_as_dict(report.topology_after),
         "same_topology": report.topology_after.same_topology(report.topology_before),
@@ -136,6 +178,7 @@ def simplification_as_dict(report: SimplificationReport) -> dict[str, Any]:
         "n_lens_vertices": report.n_lens_vertices,
         "n_lens_faces": report.n_lens_faces,
         "n_sweeps": report.n_sweeps,
+        "n_rounds": report.n_rounds,
         "remaining": report.remaining,
         "repairs": None if report.repairs is None else asdict(report.repairs),
     }
@@ -163,18 +206,29 @@ def simplification_tables(report: SimplificationReport, seconds: dict[str, float
     work.add_row("nested", counted(report.n_nested))
     work.add_row("faces removed in lenses", counted(report.n_lens_faces))
     work.add_row("sweeps", counted(report.n_sweeps))
-    left = table(f"Edges shorter than {report.options.max_edge_length:.6g} left", "reason", "count")
-    for reason, count in sorted(report.remaining.items(), key=lambda item: -item[1]):
-        left.add_row(reason.replace("_", " "), counted(count))
-    if not report.remaining:
-        left.add_row("none", "0")
-    tables = [topologies, work, left, seconds_table(seconds)]
+    if report.n_rounds > 1:
+        work.add_row("rounds", counted(report.n_rounds))
+    work.add_row("stopped by", STOPS.get(report.stop, report.stop.replace("_", " ")))
+    tables = [topologies, work]
+    if report.options.max_edge_length is not None:
+        tables.append(_remaining_table(report, report.options.max_edge_length))
+    tables.append(seconds_table(seconds))
     if report.repairs is not None:
         repairs = table("Repairs", "", "count")
         for name, count in asdict(report.repairs).items():
             repairs.add_row(name.replace("_", " "), counted(count))
         tables.insert(0, repairs)
     return tables
+
+
+def _remaining_table(report: SimplificationReport, length: float) -> Table:
+    """The short edges that are left, by reason."""
+    made = table(f"Edges shorter than {length:.6g} left", "reason", "count")
+    for reason, count in sorted(report.remaining.items(), key=lambda item: -item[1]):
+        made.add_row(reason.replace("_", " "), counted(count))
+    if not report.remaining:
+        made.add_row("none", "0")
+    return made
 
 
 def seconds_table(seconds: dict[str, float]) -> Table:

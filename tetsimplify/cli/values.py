@@ -17,36 +17,49 @@ def _number(option: str, text: str, expected: str) -> float:
     return number
 
 
-def parse_edge_length(text: str) -> tuple[float, bool]:
-    """Read a length, or a percentage of the median edge length.
+def parse_length(option: str, text: str) -> tuple[float, bool]:
+    """Read a length, or a percentage of a length that only the mesh tells.
 
     Returns
     -------
     number : float
         The length, or the part (0.5 for 50 %).
     is_relative : bool
-        Whether it is a part of the median edge length.
+        Whether it is a part.
     """
     is_relative = text.endswith("%")
     expected = "a length such as 0.5 or a percentage such as 50%"
-    number = _number("--max-edge-length", text.removesuffix("%"), expected)
+    number = _number(option, text.removesuffix("%"), expected)
     if not 0 <= number < math.inf:
-        raise OptionError(f"--max-edge-length must be {expected}, got {text!r}")
+        raise OptionError(f"{option} must be {expected}, got {text!r}")
     return (number / 100, True) if is_relative else (number, False)
 
 
-def parse_removal_limit(text: str, max_edge_length: float) -> float:
+def parse_ratio(option: str, text: str) -> float:
+    """Read a part of a whole: a number from 0 to 1, or a percentage."""
+    expected = "a number from 0 to 1 or a percentage such as 15%"
+    number = _number(option, text.removesuffix("%"), expected)
+    if text.endswith("%"):
+        number /= 100
+    if not 0 <= number <= 1:
+        raise OptionError(f"{option} must be {expected}, got {text!r}")
+    return number
+
+
+def parse_removal_limit(text: str, max_edge_length: float | None) -> float:
     """Read a length, ``inf``, or a multiple of the edge length such as ``4x``."""
     expected = "a length, inf, or a multiple of the edge length such as 4x"
     number = _number("--removal-limit", text.removesuffix("x"), expected)
-    return number * max_edge_length if text.endswith("x") else number
+    if not text.endswith("x"):
+        return number
+    if max_edge_length is None:
+        raise OptionError(f"--removal-limit {text} is a multiple of --max-edge-length: give both")
+    return number * max_edge_length
 
 
-def parse_foldover(text: str) -> float | None:
-    """Read an angle in degrees, or ``off``."""
-    if text.lower() == "off":
-        return None
-    return _number("--foldover", text, "an angle in degrees, or off")
+def parse_or_off(option: str, text: str, expected: str) -> float | None:
+    """Read a number, or ``off``."""
+    return None if text.lower() == "off" else _number(option, text, f"{expected}, or off")
 
 
 def parse_spacing(text: str) -> tuple[float, float, float]:

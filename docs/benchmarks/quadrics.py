@@ -1,0 +1,358 @@
+"""Measure the quadric mode beside other simplifiers: error, quality, topology, time.
+
+    python docs/benchmarks/quadrics.py gyroid igea.ply --keep 15 2 --json figures.json
+
+A case is ``gyroid``, ``brain`` (the volume in the package), or a mesh file. A mesh that is no
+oriented manifold is repaired first, for all tools. Every tool gets the same mesh and is asked for
+the same number of faces, in one process on one core, in turn, again and again; what the clocks
+tell, and what counts as the time of a tool, is as in ``simplify.py``.
+
+The distances, the shape of the faces and the topology are measured once for each tool, with
+``surface_distance``, ``quality`` and ``topology``. A face is flipped when its normal is opposite
+to that of the face given that is nearest to its centre.
+
+The figures are added to those in the JSON file, so that cases can be run one at a time; the
+tables are those of all cases in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from common import (
+    CLOCKS,
+    NAME,
+    TOOLS,
+    WIDTH,
+    Row,
+    Seconds,
+    Times,
+    Tool,
+    as_markdown,
+    as_rich,
+    gyroid,
+    machine,
+    one_core,
+    seconds_of,
+    spread,
+    timed,
+)
+from numpy.typing import NDArray
+from rich.console import Console
+
+import tetsimplify
+from tetsimplify import Mesh, demo, kernels
+from tetsimplify.io import read_mesh
+from tetsimplify.targets import Target
+
+CASES = (
+    "gyroid",
+    "dragon_vrip_full.ply",
+    "igea.ply",
+    "cranium_invesalius.ply",
+    "windbuildings.ply",
+)
+PEERS = tuple(tool for tool in TOOLS if "DecimatePro" not in tool.name)
+TOLERANCE = 1e-5  # of the bounds of the largest distance, in diagonals
+UNIT = 1e-5  # of distances in the tables, in diagonals
+SLIVER = 0.1  # 2 r/R
+NEEDLE = 1e-3  # 2 r/R
+
+
+# --- the cases -------------------------------------------------------------------------------
+
+
+@dataclass
+class Case:
+    """A mesh that all can take."""
+
+    name: str
+    mesh: Mesh
+    repaired: dict[str, int] | None
+    """What was mended, None of an oriented manifold."""
+
+    @property
+    def diagonal(self) -> float:
+        """Of the box around the mesh."""
+        return float(np.linalg.norm(np.ptp(self.mesh.vertices, axis=0)))
+
+
+def load(name: str, arguments: argparse.Namespace) -> Case:
+    """The case of a name or a file."""
+    if name == "gyroid":
+        return Case("gyroid, two periods a side", gyroid(arguments.faces), None)
+    if name == "brain":
+        return Case("MNI152 brain, level 80.5", demo.extract_brain(), None)
+    path = arguments.folder / name
+    mesh = read_mesh(path)
+    if tetsimplify.topology(*mesh).is_manifold:
+        return Case(path.stem, mesh, None)
+    repaired = tetsimplify.repair(*mesh)
+    return Case(path.stem, Mesh(repaired.vertices, repaired.faces), asdict(repaired.report))
+
+
+# --- measuring -------------------------------------------------------------------------------
+
+
+@dataclass
+class Measured:
+    """What one tool did in one case. Distances are in diagonals of the box around the input."""
+
+    tool: str
+    times: list[Times] = field(default_factory=list)
+    n_faces: int = 0
+    mean_to_input: float = 0.0
+    mean_from_input: float = 0.0
+    mean: float = 0.0
+    rms: float = 0.0
+    max_lower: float = 0.0
+    max_upper: float = 0.0
+    radius_ratio: float = 0.0
+    slivers: int = 0
+    needles: int = 0
+    edges_of_degree_above_2: int = 0
+    duplicate_faces: int = 0
+    degenerate_faces: int = 0
+    flipped_faces: int = 0
+    euler_characteristic: int = 0
+    same_topology: bool = False
+    error: str | None = None
+    """Why there are no figures."""
+
+
+def run(case: Case, tools: list[Tool], n_faces: int, repeats: int) -> Iterable[tuple[Any, Any]]:
+    """Run all tools in turn, again and again; give names, and the times and first results."""
+    small = gyroid(10_000)
+    tetsimplify.simplify(*small, target_faces=2_000)
+    for tool in tools:
+        tool.run(tool.prepare(small), 2_000)
+    for repeat in range(repeats):
+        times, result = timed(lambda: tetsimplify.simplify(*case.mesh, target_faces=n_faces))
+        yield (NAME, times), None if repeat else (result.vertices, result.faces)
+        for tool in tools:
+            prepared = tool.prepare(case.mesh)
+            times, raw = timed(lambda tool=tool, given=prepared: tool.run(given, n_faces))
+            yield (tool.name, times), None if repeat else tool.finish(raw)
+
+
+def normals(mesh: Mesh) -> NDArray[np.float64]:
+    """Normals of all faces, as long as twice their areas."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def n_flipped(result: Mesh, target: Target, given: NDArray[np.float64]) -> int:
+    """Number of faces whose normal is opposite to that of the input nearest to their centre."""
+    centres = target.frame.enter(result.vertices[result.faces].mean(axis=1))
+    nearest = np.empty(len(centres), np.int32)
+    source = kernels.distance.Source(
+        vertices=centres,
+        faces=result.faces,
+        vertex_distance=np.empty(len(centres)),
+        vertex_nearest=nearest,
+        centre_distance=np.empty(0),
+        centre_nearest=np.empty(0, np.int32),
+    )
+    chosen = np.arange(len(centres), dtype=np.int32)
+    stack = kernels.nearest.Stack.new()
+    kernels.distance.measure_vertices(target.arrays, source, chosen, stack)
+    return int((np.einsum("ij,ij->i", normals(result), given[nearest]) < 0.0).sum())
+
+
+def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: Any) -> None:
+    """Measure a result."""
+    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+    found = tetsimplify.topology(*result)
+    measured.n_faces = found.n_faces
+    measured.euler_characteristic = found.euler_characteristic
+    measured.edges_of_degree_above_2 = len(found.non_manifold_edges)
+    measured.duplicate_faces = len(found.duplicate_faces)
+    measured.same_topology = found.same_topology(tetsimplify.topology(*case.mesh))
+    shape = tetsimplify.quality(*result)
+    measured.degenerate_faces = len(shape.zero_area_faces)
+    measured.radius_ratio = float(shape.radius_ratio.mean())
+    measured.slivers = int((shape.radius_ratio < SLIVER).sum())
+    measured.needles = int((shape.radius_ratio < NEEDLE).sum())
+    measured.flipped_faces = n_flipped(result, target, normals(case.mesh))
+    unit = case.diagonal
+    distance = tetsimplify.surface_distance(result, case.mesh, tolerance=TOLERANCE * unit)
+    measured.mean_to_input = distance.a_to_b.mean / unit
+    measured.mean_from_input = distance.b_to_a.mean / unit
+    measured.mean = (measured.mean_to_input + measured.mean_from_input) / 2
+    measured.rms = distance.rms / unit
+    measured.max_lower, measured.max_upper = distance.lower / unit, distance.upper / unit
+
+
+def compare(
+    case: Case, tools: list[Tool], n_faces: int, repeats: int, console: Console
+) -> list[Measured]:
+    """All tools in one case."""
+    rows = {name: Measured(name) for name in (NAME, *(tool.name for tool in tools))}
+    results = {}
+    with one_core():
+        for (name, times), result in run(case, tools, n_faces, repeats):
+            rows[name].times.append(times)
+            if result is not None:
+                results[name] = [np.array(array) for array in result]
+            console.print(f"{case.name}, {n_faces:,} faces: {name}, {times['cpu']:.3g} s")
+    target = Target(case.mesh)
+    for name, result in results.items():
+        try:
+            judge(rows[name], case, target, *result)
+        except tetsimplify.MeshError as error:
+            rows[name].error = str(error)
+    return list(rows.values())
+
+
+# --- telling ---------------------------------------------------------------------------------
+
+
+def median_seconds(tool: dict[str, Any], clock: str) -> float:
+    """Median time of a tool."""
+    return statistics.median(seconds_of(tool["times"], clock))
+
+
+def comparison_rows(tools: list[dict[str, Any]], clock: str) -> list[Row]:
+    """The table of one case."""
+    ours = tools[0]
+
+    def row(tool: dict[str, Any]) -> Row:
+        seconds: Seconds = seconds_of(tool["times"], clock)
+        return {
+            "tool": tool["tool"],
+            "seconds, median (min to max)": spread(seconds),
+            "ratio": f"{statistics.median(seconds) / median_seconds(ours, clock):.2f}",
+            "faces": f"{tool['n_faces']:,}",
+            "mean": f"{tool['mean'] / UNIT:.3g}",
+            "to ours": f"{tool['mean'] / ours['mean']:.2f}",
+            "max": f"{tool['max_upper'] / UNIT:,.0f}",
+            "mean 2r/R": f"{tool['radius_ratio']:.4f}",
+            "2r/R < 0.1": f"{100 * tool['slivers'] / max(1, tool['n_faces']):.2f} %",
+            "edges of degree > 2": f"{tool['edges_of_degree_above_2']:,}",
+            "degenerate faces": f"{tool['degenerate_faces']:,}",
+            "flipped faces": f"{tool['flipped_faces']:,}",
+            "same topology": "yes" if tool["same_topology"] else "no",
+        }
+
+    return [row(tool) for tool in tools if tool["error"] is None]
+
+
+def short_rows(cases: dict[str, Any], clock: str) -> list[Row]:
+    """The figures of tetsimplify as parts of those of others."""
+
+    def row(title: str, tools: list[dict[str, Any]]) -> Row:
+        ours, others = tools[0], {tool["tool"]: tool for tool in tools[1:]}
+
+        def part(key: str, name: str) -> str:
+            tool = others.get(name)
+            return f"{ours[key] / tool[key]:.2f}" if tool and tool["error"] is None else ""
+
+        def time_part(name: str) -> str:
+            if name not in others:
+                return ""
+            return f"{median_seconds(ours, clock) / median_seconds(others[name], clock):.3f}"
+
+        return {
+            "case": title,
+            "mean / pymeshlab": part("mean", "pymeshlab quadric"),
+            "mean / fast-simplification": part("mean", "fast-simplification"),
+            "mean / meshoptimizer": part("mean", "meshoptimizer"),
+            "max / pymeshlab": part("max_upper", "pymeshlab quadric"),
+            "2r/R": f"{ours['radius_ratio']:.4f}",
+            "best 2r/R of others": f"{max(tool['radius_ratio'] for tool in others.values()):.4f}",
+            "time / pymeshlab": time_part("pymeshlab quadric"),
+            "time / fast-simplification": time_part("fast-simplification"),
+        }
+
+    return [row(title, case["tools"]) for title, case in cases.items() if len(case["tools"]) > 1]
+
+
+def tables_of(figures: dict[str, Any]) -> list[tuple[str, list[Row]]]:
+    """All tables, with their titles."""
+    tables = []
+    for title, case in figures["cases"].items():
+        chi = f"{case['euler_characteristic']:,}".replace("-", "\N{MINUS SIGN}")
+        mended = "" if case["repaired"] is None else ", repaired first"
+        heading = f"{title}: {case['n_faces']:,} faces, χ = {chi}{mended}"
+        tables.append((heading, comparison_rows(case["tools"], figures["clock"])))
+    return [
+        *tables,
+        ("tetsimplify over the others", short_rows(figures["cases"], figures["clock"])),
+    ]
+
+
+def parse() -> argparse.Namespace:
+    """What the command line says."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("cases", nargs="*", default=CASES, metavar="CASE")
+    parser.add_argument("--folder", type=Path, default=Path(), help="where the mesh files are")
+    parser.add_argument("--faces", type=int, default=2_000_000, help="faces of the gyroid")
+    parser.add_argument(
+        "--keep", type=float, nargs="*", default=[15.0, 2.0], help="per cent of the faces to keep"
+    )
+    parser.add_argument("--repeats", type=int, default=5, help="runs of every tool in every case")
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
+    parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
+    parser.add_argument("--json", type=Path, help="file to add all figures to")
+    parser.add_argument("--markdown", type=Path, help="file to write the tables to")
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Measure and tell."""
+    arguments = parse()
+    console = Console(stderr=True)
+    wanted = [
+        tool
+        for tool in PEERS
+        if arguments.tools is None or any(part in tool.name for part in arguments.tools)
+    ]
+    tools = [tool for tool in wanted if tool.is_installed]
+    figures: dict[str, Any] = {"cases": {}}
+    if arguments.json and arguments.json.exists():
+        figures = json.loads(arguments.json.read_text())
+    figures["clock"] = arguments.clock
+    figures["machine"] = machine()
+    figures["absent"] = [tool.name for tool in wanted if not tool.is_installed]
+    for name in arguments.cases:
+        case = load(name, arguments)
+        before = tetsimplify.topology(*case.mesh)
+        for keep in arguments.keep:
+            n_faces = round(keep / 100 * before.n_faces)
+            measured = compare(case, tools, n_faces, arguments.repeats, console)
+            figures["cases"][f"{case.name}, cut to {keep:g} %"] = {
+                "n_faces": before.n_faces,
+                "euler_characteristic": before.euler_characteristic,
+                "n_components": before.n_components,
+                "n_boundary_loops": before.n_boundary_loops,
+                "repaired": case.repaired,
+                "diagonal": case.diagonal,
+                "tools": [asdict(row) for row in measured],
+            }
+            if arguments.json:
+                arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
+
+    tables = tables_of(figures)
+    out = Console()
+    out.width = max(out.width, WIDTH)
+    for title, rows in tables:
+        out.print(as_rich(title, rows))
+    if figures["absent"]:
+        out.print(f"not installed: {', '.join(figures['absent'])}")
+    out.print(figures["machine"])
+    if arguments.markdown:
+        text = "\n".join(as_markdown(title, rows) for title, rows in tables)
+        arguments.markdown.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
