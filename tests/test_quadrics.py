@@ -457,6 +457,43 @@ def test_no_needle_appears_where_there_was_none():
     assert naive_quadrics.shapes(*guarded[:2]).mean() > naive_quadrics.shapes(*free[:2]).mean()
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"max_edge_length": 3.0, "removal_limit": np.inf, **OFF},
+        {"max_edge_length": 1.5},
+        {"keep_ratio": 0.1},
+        {"keep_ratio": 0.1, "placement": "endpoint"},
+    ],
+)
+def test_what_does_not_cut_itself_stays_so(options):
+    """An isosurface of noise: thin sheets everywhere, and no two faces cross."""
+    mesh = tetsimplify.extract_isosurface(np.random.default_rng(0).normal(size=(12, 12, 12)), 0.0)
+    assert tetsimplify.self_intersections(*mesh).is_embedded
+    free = tetsimplify.simplify(*mesh, **options)
+    held = tetsimplify.simplify(*mesh, intersections="prevent", **options)
+    assert not tetsimplify.self_intersections(*free[:2]).is_embedded
+    assert tetsimplify.self_intersections(*held[:2]).is_embedded
+    assert_same_topology(mesh.faces, held)
+    assert len(held.faces) < 1.3 * len(free.faces)
+    if "max_edge_length" in options:
+        assert held.report.remaining["intersection"] > 0
+
+
+def test_what_cuts_itself_already_cuts_itself_nowhere_else():
+    for seed in range(30):
+        vertices, faces = strategies.adversarial_mesh(seed)
+        before = {
+            tuple(pair) for pair in tetsimplify.self_intersections(vertices, faces).pairs.tolist()
+        }
+        result = tetsimplify.simplify(
+            vertices, faces, target_faces=1, intersections="prevent", removal_limit=np.inf
+        )
+        assert_same_topology(faces, result)
+        pairs = result.face_map[tetsimplify.self_intersections(*result[:2]).pairs]
+        assert {tuple(pair) for pair in pairs.tolist()} <= before
+
+
 # --- manners --------------------------------------------------------------------------------------
 
 
@@ -523,6 +560,7 @@ def test_empty_and_tiny_meshes(mesh, cost):
         ({"max_quadric_error": math.nan}, "max_quadric_error must be"),
         ({"keep_ratio": 0.5, "cost": "curvature"}, "cost must be one of 'auto', 'length'"),
         ({"keep_ratio": 0.5, "boundary": "free"}, "boundary must be one of 'simplify', 'keep'"),
+        ({"keep_ratio": 0.5, "intersections": "fix"}, "intersections must be one of 'allow'"),
         ({"keep_ratio": 0.5, "shape": 1.5}, "shape must be from 0 to 1"),
         ({"keep_ratio": 0.5, "normal_deviation": "off"}, "normal_deviation must be a number"),
         (

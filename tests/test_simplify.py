@@ -237,7 +237,7 @@ def test_foldover_guard_bounds_the_turn_of_every_face():
     turned = 0
     previous = normals_of(engine)
     for first in range(len(faces)):
-        surface = engine._surface, None, engine._scratch, engine.rules
+        surface = engine._surface, None, None, engine._scratch, engine.rules
         if kernels.sweep.sweep(*surface, first, first + 1, kernels.state.STALE_EVEN, True) == 0:
             continue  # one contraction at a time, because two may turn the same face
         current = normals_of(engine)

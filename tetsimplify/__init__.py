@@ -9,6 +9,7 @@ from tetsimplify.errors import (
     TetsimplifyError,
     VolumeError,
 )
+from tetsimplify.intersections import IntersectionReport, self_intersections
 from tetsimplify.isosurface import extract_isosurface
 from tetsimplify.mesh import Mesh
 from tetsimplify.quality import QualityReport, quality
@@ -21,6 +22,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "FileError",
+    "IntersectionReport",
     "Mesh",
     "MeshError",
     "MissingExtraError",
@@ -36,6 +38,7 @@ __all__ = [
     "extract_isosurface",
     "quality",
     "repair",
+    "self_intersections",
     "simplify",
     "surface_distance",
     "topology",

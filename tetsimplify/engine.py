@@ -17,6 +17,7 @@ from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options, Progre
 from tetsimplify.topology import TopologyReport, analyse
 
 if TYPE_CHECKING:
+    from tetsimplify.kernels.intersections import Watch
     from tetsimplify.kernels.state import Quadrics, Rules, Scratch
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`
@@ -97,6 +98,7 @@ class Engine:
         )
         self._quadrics = self._build_quadrics(bound) if options.uses_quadrics else None
         self._cost = None if options.has_one_threshold else np.empty(3 * m, np.float32)
+        self._watch = self._new_watch()
         self._face_origin = np.arange(m, dtype=np.int32)
         self._scratch = _scratch(m, n + n_loops)
 
@@ -151,6 +153,14 @@ class Engine:
                 surface, quadrics.terms, BOUNDARY_WEIGHT, FEATURE_WEIGHT, sharp
             )
         return quadrics
+
+    def _new_watch(self) -> Watch | None:
+        """Boxes around the faces as they are, for the guard against self-intersections."""
+        if self.options.intersections == "allow":
+            return None
+        faces = self._surface.corner_vertex.reshape(-1, 3)
+        watch: Watch = kernels.intersections.watch_over(self._surface.vertices, faces)
+        return watch
 
     def run(self, progress: Progress | None = None) -> None:
         """Sweep until a criterion is reached, or no edge is left that the rules let go."""
@@ -240,7 +250,7 @@ class Engine:
         state = kernels.state
         rules = self.rules._replace(max_cost=threshold)
         n_contracted = kernels.sweep.sweep_ranked(
-            *(self._surface, self._quadrics, self._scratch, rules, self._cost),
+            *(self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost),
             *(0, len(self._face_origin), state.STALE_ODD),
         )
         n_contracted += self._unblock_deferred(rules, state.STALE_ODD)
@@ -263,7 +273,15 @@ class Engine:
         for first in range(0, n_faces, FACES_AT_ONCE):
             last = min(first + FACES_AT_ONCE, n_faces)
             n_contracted += kernels.sweep.sweep(
-                self._surface, self._quadrics, self._scratch, self.rules, first, last, colour, retry
+                self._surface,
+                self._quadrics,
+                self._watch,
+                self._scratch,
+                self.rules,
+                first,
+                last,
+                colour,
+                retry,
             )
             if progress is not None:  # every sweep is half of what is still to do
                 progress("contract", 1.0 - 0.5**self.n_sweeps * (1.0 - 0.5 * last / n_faces))
@@ -372,21 +390,13 @@ class Engine:
         return n_contracted
 
     def _unblock(self, rules: Rules, colour: int, *, commit: bool) -> int:
-        arguments = (
-            self._surface,
-            self._quadrics,
-            self._scratch,
-            rules,
-            self._cost,
-            self._outer,
-            colour,
-            commit,
-        )
-        return int(kernels.sweep.unblock(*arguments))
+        bundles = self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost
+        return int(kernels.sweep.unblock(*bundles, self._outer, colour, commit))
 
     def _compact_when_half(self) -> None:
         if 2 * self.n_faces < len(self._face_origin):
             self._compact()
+            self._watch = self._new_watch()
 
     def _compact(self) -> None:
         """Drop the dead faces."""

@@ -21,6 +21,7 @@ BLOCKED = ("contract", "skip", "violate")
 OUTER = ("region", "path", "distance")
 COSTS = ("auto", "length", "quadric")
 BOUNDARIES = ("simplify", "keep", "lock")
+INTERSECTIONS = ("allow", "prevent")
 
 
 class Placement(NamedTuple):
@@ -73,6 +74,7 @@ class Options:
     foldover: float | None = DEFAULT_FOLDOVER
     normal_deviation: float | str | None = "auto"
     shape: float | str | None = "auto"
+    intersections: str = "allow"
 
     def __post_init__(self) -> None:
         for name, high in (
@@ -96,6 +98,7 @@ class Options:
         _check_choice("blocked", self.blocked, BLOCKED)
         _check_choice("outer", self.outer, OUTER)
         _check_choice("boundary", self.boundary, BOUNDARIES)
+        _check_choice("intersections", self.intersections, INTERSECTIONS)
         if not any(getattr(self, name) is not None for name in CRITERIA):
             raise OptionError(f"give at least one of {', '.join(CRITERIA)}")
         if self.feature_angle is not None and self.by_length:

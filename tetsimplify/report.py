@@ -77,8 +77,9 @@ class SimplificationReport:
     that is not given."""
     remaining_reasons: NDArray[np.str_] = field(repr=False)
     """Shape (k,): why each is left: ``"obstructed"`` (proven impossible), ``"removal_limit"``,
-    ``"foldover"``, ``"normal_deviation"``, ``"shape"``, ``"locked"``, ``"error_bound"``,
-    ``"target_faces"`` (there were few enough), or ``"skipped"`` with ``blocked="skip"``."""
+    ``"foldover"``, ``"normal_deviation"``, ``"shape"``, ``"intersection"``, ``"locked"``,
+    ``"error_bound"``, ``"target_faces"`` (there were few enough), or ``"skipped"`` with
+    ``blocked="skip"``."""
     repairs: RepairReport | None = None
     """What was repaired, None where repair was not asked for."""
 

@@ -40,6 +40,7 @@ def simplify(
     foldover: float | None = DEFAULT_FOLDOVER,
     normal_deviation: float | str | None = "auto",
     shape: float | str | None = "auto",
+    intersections: str = "allow",
     locked: ArrayLike | None = None,
     repair: bool = False,
     vertex_data: Mapping[str, ArrayLike] | None = None,
@@ -115,6 +116,8 @@ def simplify(
         From 0 to 1, where 1 is an equilateral triangle. Triangles worse than this make an edge
         dearer if they are worse than those around it were, and then they may not be needles.
         None is no such thing; "auto" is 0.9 by quadric error and None by length.
+    intersections : {"allow", "prevent"}
+        With "prevent" no two faces come to cross that did not cross before, told exactly; slower.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
     repair : bool
@@ -192,6 +195,7 @@ def simplify(
         "foldover": foldover,
         "normal_deviation": normal_deviation,
         "shape": shape,
+        "intersections": intersections,
     }
     if faces is None:
         return adapters.simplify(

@@ -140,9 +140,7 @@ def distance_as_dict(distance: SurfaceDistance) -> dict[str, Any]:
     """Bounds and means of both directions together, and of each."""
     names = ("lower", "upper", "mean", "rms")
     parts = {"": distance, "a_to_b": distance.a_to_b, "b_to_a": distance.b_to_a}
-    found = {
-        part: {name: getattr(each, name) for name in names} for part, each in parts.items()
-    }
+    found = {part: {name: getattr(each, name) for name in names} for part, each in parts.items()}
     return {**found.pop(""), **found, "tolerance": distance.tolerance}
 
 

@@ -21,6 +21,7 @@ from tetsimplify.kernels.state import (
     ERROR_BOUND,
     FACTOR,
     FOLLOWER,
+    INTERSECTION,
     LOCKED,
     N_LENS_FACES,
     N_LENS_VERTICES,
@@ -35,10 +36,11 @@ from tetsimplify.kernels.state import (
     TOO_DEAR,
     VIOLATE,
 )
+from tetsimplify.kernels.watch import follow, star_crosses
 
 
 @part
-def contract_simple(surface, quadrics, scratch, rules, corner, colour):
+def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 
     NESTED when it does not; with ``blocked="violate"`` it does not matter.
@@ -59,18 +61,23 @@ def contract_simple(surface, quadrics, scratch, rules, corner, colour):
     placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
     if placed == CONTRACTIBLE and quadrics is not None:
         placed = _judge(quadrics, scratch, rules, v, u)
+    if placed == CONTRACTIBLE and watch is not None:
+        if star_crosses(watch, surface, scratch, v, u, n_v, n_u, n_doomed):
+            placed = INTERSECTION
     if placed != CONTRACTIBLE:
         return placed
     loop = max(surface.loop[v], surface.loop[u])
     if n_doomed == 1 and loop >= 0:
         surface.loop_size[loop] -= 1
     _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
+    if watch is not None:
+        follow(watch, surface, scratch.lists[STAR_V], n_v + n_u)
     scratch.tally[N_SIMPLE] += 1
     return CONTRACTIBLE
 
 
 @inlined
-def contract_nested(surface, quadrics, scratch, rules, outer, corner, colour, commit):
+def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, colour, commit):
     """Contract the edge that begins at `corner` and remove the lenses beside the kept one.
 
     Where the link condition allows the contraction there is but one lens, which is kept.
@@ -88,6 +95,9 @@ def contract_nested(surface, quadrics, scratch, rules, outer, corner, colour, co
     if placed == CONTRACTIBLE and quadrics is not None:
         _add_removed(surface, quadrics, scratch, lens.first_removed)
         placed = _judge(quadrics, scratch, rules, v, u)
+    if placed == CONTRACTIBLE and watch is not None:
+        if star_crosses(watch, surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed):
+            placed = INTERSECTION
     if placed != CONTRACTIBLE or not commit:
         return placed
     if lens.loop_size > 0:
@@ -97,6 +107,8 @@ def contract_nested(surface, quadrics, scratch, rules, outer, corner, colour, co
         surface.merged_into[vertex] = -1
         vertex = scratch.nodes[FOLLOWER, vertex]
     _merge(surface, quadrics, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
+    if watch is not None:
+        follow(watch, surface, scratch.lists[STAR_V], lens.n_v + lens.n_u)
     if scratch.tally[N_LENSES] > 1:
         scratch.tally[N_NESTED] += 1
         scratch.tally[N_LENS_VERTICES] += lens.n_removed

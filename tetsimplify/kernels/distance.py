@@ -174,6 +174,12 @@ def exceeding_faces(
         put_face(vertices, faces, fi, near, pieces)
         if worst_corner(target, near, pieces, 0)[1] <= limit * limit:
             continue
+        x, y, z, radius = middle(pieces, 0)
+        if radius < limit:  # one search may do
+            distance2, near = nearest_face(target, x, y, z, near, stack)
+            if np.sqrt(distance2) + radius <= limit:
+                continue
+            pieces.near[0] = near
         height, above = cover_height(target, column, pieces.corners[0], limit, stack)
         if above >= 0:
             near = pieces.near[0] = above

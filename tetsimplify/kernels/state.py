@@ -15,12 +15,12 @@ SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED = 0, 1, 2, 3, 4
 # What becomes of an edge that is to be contracted. NESTED: the link condition blocks it. ENOUGH:
 # there would be fewer faces than asked for. TOO_DEAR: it costs more than the sweep allows.
 CONTRACTIBLE, OBSTRUCTED, REMOVAL_LIMIT, LOCKED, NESTED, ENOUGH, TOO_DEAR = 0, 1, 2, 3, 4, 5, 6
-ERROR_BOUND, FOLDOVER, NORMAL_DEVIATION, SHAPE = 7, 8, 9, 10
+ERROR_BOUND, FOLDOVER, NORMAL_DEVIATION, SHAPE, INTERSECTION = 7, 8, 9, 10, 11
 # What is told of an edge that is left. One that could be contracted is left when there were few
 # enough faces, one that the link condition blocks when those are skipped.
 REASONS = (
     *("target_faces", "obstructed", "removal_limit", "locked", "skipped", "target_faces"),
-    *("target_faces", "error_bound", "foldover", "normal_deviation", "shape"),
+    *("target_faces", "error_bound", "foldover", "normal_deviation", "shape", "intersection"),
 )
 
 # What to do with an edge that the link condition blocks.

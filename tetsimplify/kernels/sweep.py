@@ -44,7 +44,7 @@ def _renew_stamps(scratch):
 
 
 @kernel_in_place
-def sweep(surface, quadrics, scratch, rules, first, last, colour, retry):
+def sweep(surface, quadrics, watch, scratch, rules, first, last, colour, retry):
     """Contract at most one short edge of each of the faces from `first` to `last`.
 
     Parameters
@@ -79,7 +79,7 @@ def sweep(surface, quadrics, scratch, rules, first, last, colour, retry):
                 break
             if state == BLOCKED and surface.verdict[3 * f + k] == OBSTRUCTED:
                 continue  # for as long as its ends stay what they are
-            outcome = contract_simple(surface, quadrics, scratch, rules, 3 * f + k, colour)
+            outcome = contract_simple(surface, quadrics, watch, scratch, rules, 3 * f + k, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
                 is_nested = False
@@ -93,7 +93,7 @@ def sweep(surface, quadrics, scratch, rules, first, last, colour, retry):
 
 
 @kernel_in_place
-def sweep_ranked(surface, quadrics, scratch, rules, cost, first, last, colour):
+def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, first, last, colour):
     """Contract at most one edge below ``rules.max_cost`` of each face from `first` to `last`.
 
     An edge that is refused waits for a higher threshold: for what it costs at the place where it
@@ -125,7 +125,7 @@ def sweep_ranked(surface, quadrics, scratch, rules, cost, first, last, colour):
             corner = 3 * f + k
             if cost[corner] >= rules.max_cost:
                 break
-            outcome = contract_simple(surface, quadrics, scratch, rules, corner, colour)
+            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
                 is_nested = False
@@ -151,7 +151,7 @@ def _put_off(surface, scratch, rules, cost, corner, outcome):
 
 
 @kernel_in_place
-def unblock(surface, quadrics, scratch, rules, cost, outer, colour, commit):
+def unblock(surface, quadrics, watch, scratch, rules, cost, outer, colour, commit):
     """Contract at most one blocked edge of each of the faces put off.
 
     Parameters
@@ -192,7 +192,7 @@ def unblock(surface, quadrics, scratch, rules, cost, outer, colour, commit):
                 continue
             _renew_stamps(scratch)
             outcome = contract_nested(
-                surface, quadrics, scratch, rules, outer, corner, colour, commit
+                surface, quadrics, watch, scratch, rules, outer, corner, colour, commit
             )
             if commit and outcome == CONTRACTIBLE:
                 n_contracted += 1
