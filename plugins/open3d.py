@@ -76,7 +76,7 @@ class NotManifoldError(MeshError, RuntimeError):
 
 
 def simplify(mesh: Any, *, return_report: bool = False, **options: Any) -> Any:
-    """Contract every edge shorter than `max_edge_length` without changing the topology.
+    """Contract edges until a criterion is reached, without changing the topology.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def simplify(mesh: Any, *, return_report: bool = False, **options: Any) -> Any:
     return_report : bool
         Return the :class:`tetsimplify.SimplificationReport` too.
     **options
-        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `placement`, `locked`, ...
+        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `keep_ratio`, `locked`, ...
 
     Returns
     -------

@@ -73,7 +73,7 @@ def simplify(
     locked: Any = None,
     **options: Any,
 ) -> Any:
-    """Contract every edge shorter than `max_edge_length` without changing the topology.
+    """Contract edges until a criterion is reached, without changing the topology.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def simplify(
     return_report : bool
         Return the :class:`tetsimplify.SimplificationReport` too.
     locked, **options
-        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `placement`, ...
+        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `keep_ratio`, ...
 
     Returns
     -------

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from tetsimplify.plugins.pymeshlab_arrays import (
     WEDGES,
     from_pymeshlab,
@@ -16,14 +15,21 @@ from tetsimplify.plugins.pymeshlab_arrays import (
 )
 from tetsimplify.plugins.pymeshlab_in_place import Selection, Writer, textures_of_faces
 
-from tetsimplify import kernels, seams
+from tetsimplify import seams
 from tetsimplify.adapters import needs
 from tetsimplify.errors import MeshError, TetsimplifyError
 from tetsimplify.isosurface import extract_isosurface
 from tetsimplify.lattices import LATTICES
-from tetsimplify.options import BLOCKED, DEFAULT_FOLDOVER, OUTER, PLACEMENTS
+from tetsimplify.options import (
+    BLOCKED,
+    COSTS,
+    CRITERIA,
+    DEFAULT_FOLDOVER,
+    GUARDS_OF_QUADRICS,
+    OUTER,
+    PLACEMENTS,
+)
 from tetsimplify.report import SimplificationReport
-from tetsimplify.topology import analyse
 
 with needs("pymeshlab"):
     import pymeshlab
@@ -31,6 +37,8 @@ with needs("pymeshlab"):
 
 SIMPLIFY = "meshing_decimation_topology_preserving_edge_collapse"
 ISOSURFACE = "generate_isosurface_by_marching_tetrahedra"
+
+DEFAULT_LENGTH = 1.0  # per cent of the diagonal, where nothing says what to stop at
 
 
 class Parameter(NamedTuple):
@@ -42,8 +50,8 @@ class Parameter(NamedTuple):
     default: Any
     """None is "depends on the others", and is described by `note`."""
     option: str = ""
-    """What the filter takes it as, mostly an option of the core. Without one it is pending:
-    known, and refused until what it asks for exists."""
+    """What the filter takes it as, mostly an option of the core. Without one it is fixed: known,
+    as other filters have it, and refused with any other value than the default."""
     as_option: Callable[[Any], Any] = lambda value: value
     """The value of the option, of that of the parameter; lengths are in units of the mesh."""
     note: str = ""
@@ -59,12 +67,12 @@ class Filter(NamedTuple):
 
     @property
     def live(self) -> dict[str, Parameter]:
-        """The parameters that are not pending."""
+        """The parameters that are not fixed."""
         return {name: each for name, each in self.parameters.items() if each.option}
 
 
 def simplify_current_mesh(ms: pymeshlab.MeshSet, **parameters: Any) -> dict[str, Any]:
-    """Contract every short edge of the current mesh in place, whatever its topology.
+    """Contract edges of the current mesh in place, whatever its topology.
 
     This is the filter ``meshing_decimation_topology_preserving_edge_collapse`` as a function.
 
@@ -72,17 +80,32 @@ def simplify_current_mesh(ms: pymeshlab.MeshSet, **parameters: Any) -> dict[str,
     ----------
     ms : pymeshlab.MeshSet
         Its current mesh is changed in place and stays current under its id.
+    targetfacenum : int
+        So many faces are left; 0 is no target.
+    targetperc : float
+        The same as a part of the faces, from 0 to 1; goes before `targetfacenum` unless 0.
     maxedgelength : PercentageValue or PureValue
-        Shorter edges are contracted. Percentages are of the diagonal of the bounding box.
+        Longer edges are left. Percentages are of the diagonal of the bounding box. When neither
+        this nor a target nor an error is given, it is 1 %.
+    maxerror, maxquadricerror : PercentageValue or PureValue
+        `max_error` and `max_quadric_error` of :func:`tetsimplify.simplify`.
+    qualitythr : float
+        Triangles of worse shape are penalized, from 0 (none) to 1.
     preserveboundary : bool
-        Vertices on the boundary stay where they are.
+        Boundaries stay the same curves.
+    preservenormal : bool
+        Faces keep within 90 degrees of the surface given.
+    optimalplacement : bool
+        New vertices go where the quadric error is least, or else where one end of the edge was.
     selected : bool
         Only selected faces change. By default where faces are selected, as in other filters.
-    blocked, placement, outer : str
+    cost, blocked, placement, outer : str
         See :func:`tetsimplify.simplify`.
+    featureangle : float
+        Edges between faces whose normals differ by more are held, in degrees; 180 holds none.
     removallimit : PercentageValue or PureValue
-        How far from its edge a contraction may remove vertices, 4 times `maxedgelength` if not
-        given.
+        How far from its edge a contraction may remove vertices, 4 times `maxedgelength`, or the
+        edge itself, if not given.
     foldover : float
         Largest change of a face normal in one contraction, in degrees; 180 is no limit.
 
@@ -157,8 +180,11 @@ def _simplify_in_place(ms: pymeshlab.MeshSet, options: dict[str, Any]) -> dict[s
     locked[ends] = True
     if options.pop("selected"):
         locked[given.faces[~selected.faces]] = True
-    if options.pop("preserveboundary"):
-        locked |= _on_boundary(given.faces, len(locked))
+    if options["keep_ratio"] is not None:
+        options["target_faces"] = None
+    optimum = options.pop("optimum")
+    if optimum is not None:
+        options["placement"] = "quadric" if optimum else "endpoint"
     result = seams.simplify(
         given.vertices,
         given.faces,
@@ -194,45 +220,70 @@ def _figures(mesh: pymeshlab.Mesh, report: SimplificationReport) -> dict[str, An
         "shortest_edge_before": report.shortest_edge_before,
         "shortest_edge": report.shortest_edge_after,
         "remaining_short_edges": report.remaining,
+        "stop": report.stop,
         "seconds": sum(report.seconds.values()),
     }
 
 
-def _on_boundary(faces: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_]:
-    """Which vertices are on the boundary."""
-    corner_vertex = faces.reshape(-1)
-    corners = kernels.corners.link_corners(corner_vertex, n_vertices)
-    loop = analyse(corner_vertex, *corners)[1]
-    return loop >= 0
-
-
 # --- parameters ------------------------------------------------------------------------------
+
+
+def _unless(off: float) -> Callable[[Any], Any]:
+    """None for the value that switches an option off."""
+    return lambda value: None if value == off else value
+
+
+def _guard(given: float | bool | None, value: float) -> float | str | None:
+    """A guard as the core takes it: as it is by default, at a value, or off."""
+    return "auto" if given is None else value if given else None
+
 
 FILTERS = {
     SIMPLIFY: Filter(
         _simplify_in_place,
         {
-            "maxedgelength": Parameter(PercentageValue, PercentageValue(1), "max_edge_length"),
-            "targetfacenum": Parameter(int, 0),
-            "targetperc": Parameter(float, 0.0),
-            "qualitythr": Parameter(float, 0.3),
-            "preserveboundary": Parameter(bool, False, "preserveboundary"),
+            "targetfacenum": Parameter(int, 0, "target_faces", _unless(0)),
+            "targetperc": Parameter(float, 0.0, "keep_ratio", _unless(0)),
+            "maxedgelength": Parameter(
+                PercentageValue, None, "max_edge_length", note="1% unless there is a target"
+            ),
+            "maxerror": Parameter(PercentageValue, None, "max_error", note="no limit"),
+            "maxquadricerror": Parameter(
+                PercentageValue, None, "max_quadric_error", note="no limit"
+            ),
+            "cost": Parameter(str, "auto", "cost", choices=COSTS),
+            "qualitythr": Parameter(
+                float,
+                None,
+                "shape",
+                lambda value: _guard(value, value),
+                note=f"{GUARDS_OF_QUADRICS['shape']:g} by quadric error, else 0",
+            ),
+            "preserveboundary": Parameter(
+                bool, False, "boundary", lambda keep: "keep" if keep else "simplify"
+            ),
             "boundaryweight": Parameter(float, 1.0),
-            "preservenormal": Parameter(bool, False),
-            "optimalplacement": Parameter(bool, True),
+            "preservenormal": Parameter(
+                bool,
+                None,
+                "normal_deviation",
+                lambda keep: _guard(keep, GUARDS_OF_QUADRICS["normal_deviation"]),
+                note="True by quadric error, else False",
+            ),
+            "preservetopology": Parameter(bool, True),
+            "optimalplacement": Parameter(bool, None, "optimum", note="as placement says"),
             "planarquadric": Parameter(bool, False),
             "planarweight": Parameter(float, 0.001),
             "qualityweight": Parameter(bool, False),
+            "featureangle": Parameter(float, 180.0, "feature_angle", _unless(180)),
             "selected": Parameter(bool, None, "selected", note="whether faces are selected"),
             "blocked": Parameter(str, "contract", "blocked", choices=BLOCKED),
-            "placement": Parameter(str, "midpoint", "placement", choices=tuple(PLACEMENTS)),
+            "placement": Parameter(str, "auto", "placement", choices=("auto", *PLACEMENTS)),
             "removallimit": Parameter(
-                PercentageValue, None, "removal_limit", note="4 * maxedgelength"
+                PercentageValue, None, "removal_limit", note="4 * maxedgelength, or 4 * the edge"
             ),
             "outer": Parameter(str, "region", "outer", choices=OUTER),
-            "foldover": Parameter(
-                float, DEFAULT_FOLDOVER, "foldover", lambda angle: None if angle >= 180 else angle
-            ),
+            "foldover": Parameter(float, DEFAULT_FOLDOVER, "foldover", _unless(180)),
         },
     ),
     ISOSURFACE: Filter(
@@ -279,7 +330,7 @@ def apply(ms: pymeshlab.MeshSet, name: str, given: Mapping[str, Any]) -> dict[st
 
 
 def checked(ms: pymeshlab.MeshSet, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """All parameters of a filter that are not pending, checked, with the defaults filled in.
+    """All parameters of a filter that are not fixed, checked, with the defaults filled in.
 
     Lengths are in units of the current mesh.
     """
@@ -291,13 +342,15 @@ def checked(ms: pymeshlab.MeshSet, name: str, given: Mapping[str, Any]) -> dict[
             raise PyMeshLabException(
                 f"Parameter {key} not found for filter {name}. Please check the documentation."
             )
-        if key not in live:
+        if key not in live and _cast(key, parameters[key], given[key]) != parameters[key].default:
             raise PyMeshLabException(
-                f"Parameter {key} of filter {name} comes with the quadric mode, which this "
-                "version does not have yet: give maxedgelength."
+                f"Parameter {key} of filter {name} can only be {parameters[key].default}."
             )
     values = {key: each.default for key, each in live.items()}
-    values |= {key: _cast(key, live[key], value) for key, value in given.items()}
+    values |= {key: _cast(key, live[key], given[key]) for key in given if key in live}
+    criteria = [key for key, each in live.items() if each.option in CRITERIA]
+    if criteria and not any(values[key] for key in criteria):
+        values["maxedgelength"] = PercentageValue(DEFAULT_LENGTH)
     if "selected" in values and values["selected"] is None:
         values["selected"] = ms.current_mesh().selected_face_number() > 0
     if name == ISOSURFACE and values["volume"] is None:

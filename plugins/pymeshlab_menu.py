@@ -71,7 +71,7 @@ def _filter_parameter_values(self: pymeshlab.MeshSet, name: str, **given: Any) -
         native: dict[str, Any] = _native["filter_parameter_values"](self, name, **given)
         return native
     values = checked(self, name, {"volume": (), **given} if name == ISOSURFACE else given)
-    if name == SIMPLIFY and values["removallimit"] is None:
+    if name == SIMPLIFY and values["removallimit"] is None and values["maxedgelength"]:
         values["removallimit"] = DEFAULT_REMOVAL_LIMIT * values["maxedgelength"]
     return values
 

@@ -40,7 +40,7 @@ class NotTrianglesError(MeshError, NotAllTrianglesError):
 
 
 def simplify(mesh: pyvista.PolyData, *, return_report: bool = False, **options: Any) -> Any:
-    """Contract every edge shorter than `max_edge_length` without changing the topology.
+    """Contract edges until a criterion is reached, without changing the topology.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def simplify(mesh: pyvista.PolyData, *, return_report: bool = False, **options: 
     return_report : bool
         Return the :class:`tetsimplify.SimplificationReport` too.
     **options
-        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `placement`, `locked`, ...
+        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `keep_ratio`, `locked`, ...
 
     Returns
     -------
@@ -267,7 +267,7 @@ class MeshAccessor:
     def simplify(
         self, max_edge_length: float | None = None, *, return_report: bool = False, **options: Any
     ) -> Any:
-        """Contract every short edge; see :func:`tetsimplify.plugins.pyvista.simplify`."""
+        """Contract edges; see :func:`tetsimplify.plugins.pyvista.simplify`."""
         if max_edge_length is not None:
             options["max_edge_length"] = max_edge_length
         return simplify(self._mesh, return_report=return_report, **options)

@@ -36,7 +36,7 @@ MATERIAL = VISUAL + "face_materials"
 def simplify(
     mesh: trimesh.Trimesh | trimesh.Scene, *, return_report: bool = False, **options: Any
 ) -> Any:
-    """Contract every edge shorter than `max_edge_length` without changing the topology.
+    """Contract edges until a criterion is reached, without changing the topology.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def simplify(
         Return the :class:`tetsimplify.SimplificationReport` too; for a scene a dictionary of
         them under the names of the geometries.
     **options
-        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `placement`, `locked`, ...
+        Those of :func:`tetsimplify.simplify`: `max_edge_length`, `keep_ratio`, `locked`, ...
 
     Returns
     -------

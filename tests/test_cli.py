@@ -142,7 +142,8 @@ def test_volume_with_nan(tmp_path):
 SIMPLIFY_KEYS = {
     "command", "version", "input", "outputs", "options", "topology_before", "topology_after",
     "same_topology", "shortest_edge_before", "shortest_edge_after", "n_simple", "n_nested",
-    "n_lens_vertices", "n_lens_faces", "n_sweeps", "remaining", "repairs", "seconds", "notes",
+    "n_lens_vertices", "n_lens_faces", "n_sweeps", "n_rounds", "stop", "remaining", "repairs",
+    "seconds", "notes",
 }  # fmt: skip
 
 
@@ -151,6 +152,7 @@ def test_simplify_mesh(mesh_path, tmp_path):
     result = run_json("simplify", mesh_path, "-o", target, "--max-edge-length", 1.0)
     assert set(result) == SIMPLIFY_KEYS
     assert result["options"]["max_edge_length"] == 1.0
+    assert result["stop"] == "max_edge_length"
     assert result["same_topology"]
     assert result["repairs"] is None
     mesh = read_mesh(target)
@@ -191,6 +193,63 @@ def test_simplify_options(mesh_path, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--target-faces", 200], {"target_faces": 200}),
+        (["--keep-ratio", "15%"], {"keep_ratio": 0.15}),
+        (["--keep-ratio", "0.15"], {"keep_ratio": 0.15}),
+        (["--max-error", "0.5"], {"max_error": 0.5}),
+        (["--max-quadric-error", "0.5"], {"max_quadric_error": 0.5}),
+        (
+            ["--max-edge-length", "1", "--target-faces", 3000],
+            {"max_edge_length": 1.0, "target_faces": 3000},
+        ),
+    ],
+)
+def test_simplify_until_a_criterion_is_reached(mesh_path, tmp_path, options, expected):
+    target = tmp_path / "a.ply"
+    result = run_json("simplify", mesh_path, "-o", target, *options)
+    given = {name: value for name, value in result["options"].items() if value is not None}
+    assert expected.items() <= given.items()
+    assert result["stop"] == list(expected)[-1]
+    library = tetsimplify.simplify(*read_mesh(mesh_path), **expected)
+    np.testing.assert_array_equal(read_mesh(target).vertices, library.vertices)
+    text = run("simplify", mesh_path, "-o", target, *options).stdout
+    assert result["stop"].replace("_", " ") in text
+    assert ("Edges shorter than" in text) == ("max_edge_length" in expected)
+
+
+def test_percentage_of_an_error_is_of_the_diagonal(mesh_path, tmp_path):
+    mesh = read_mesh(mesh_path)
+    diagonal = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    far = Mesh(np.concatenate([mesh.vertices, [[1e6, 0, 0]]]), mesh.faces)  # in no face
+    write_mesh(tmp_path / "far.ply", far)
+    for name in ("max-error", "max-quadric-error"):
+        for path in (mesh_path, tmp_path / "far.ply"):
+            command = ("simplify", path, "-o", tmp_path / "a.ply", "--repair", f"--{name}", "1%")
+            expected = pytest.approx(0.01 * diagonal)
+            assert run_json(*command)["options"][name.replace("-", "_")] == expected
+
+
+def test_simplify_without_end_says_what_is_in_the_way(mesh_path, tmp_path):
+    command = ("simplify", mesh_path, "-o", tmp_path / "a.ply", "--target-faces", 2)
+    assert run_json(*command)["stop"] == "exhausted"
+    assert "topology and guards" in run(*command).stdout
+
+
+def test_options_by_quadric_error(mesh_path, tmp_path):
+    result = run_json(
+        "simplify", mesh_path, "-o", tmp_path / "a.ply", "--keep-ratio", 0.5, "--cost", "length",
+        "--placement", "quadric", "--boundary", "keep", "--feature-angle", 40,
+        "--normal-deviation", 60, "--shape", "off", "--removal-limit", "inf",
+    )  # fmt: skip
+    expected = {"keep_ratio": 0.5, "cost": "length", "placement": "quadric", "boundary": "keep",
+                "feature_angle": 40, "normal_deviation": 60, "shape": None,
+                "removal_limit": "inf"}  # fmt: skip
+    assert {name: result["options"][name] for name in expected} == expected
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--max-edge-length", "five"], "a length such as 0.5 or a percentage"),
@@ -201,7 +260,15 @@ def test_simplify_options(mesh_path, tmp_path):
         (["--max-edge-length", "1", "--level", "3"], "--level: only for volumes"),
         (["--max-edge-length", "1", "--closed"], "--closed: only for volumes"),
         (["--max-edge-length", "1", "--unknown"], "No such option"),
-        ([], "Missing option '--max-edge-length'"),
+        ([], "give at least one of --max-edge-length, --target-faces, --keep-ratio, --max-error"),
+        (["--placement", "quadric"], "give at least one of"),
+        (["--target-faces", "many"], "--target-faces"),
+        (["--target-faces", "-1"], "target_faces must be at least 0"),
+        (["--keep-ratio", "150%"], "a number from 0 to 1 or a percentage"),
+        (["--max-error", ""], "--max-error must be a length"),
+        (["--max-error", "1%", "--removal-limit", "4x"], "a multiple of --max-edge-length"),
+        (["--max-error", "1%", "--normal-deviation", "much"], "an angle in degrees, or off"),
+        (["--max-error", "1%", "--shape", "2"], "shape must be from 0 to 1"),
     ],
 )
 def test_wrong_usage(mesh_path, tmp_path, options, message):
@@ -239,15 +306,46 @@ def test_info(mesh_path):
         "input",
         "topology",
         "edge_lengths",
+        "quality",
         "seconds",
         "notes",
     }
     assert set(result["topology"]) == TOPOLOGY_KEYS
     assert result["edge_lengths"]["min"] <= result["edge_lengths"]["median"]
+    quality = tetsimplify.quality(*read_mesh(mesh_path))
+    assert result["quality"] == as_plain(quality.as_dict())
     text = run("info", mesh_path).stdout
     for words in ("Euler characteristic", "genus", "edges of degree 2", "median"):
         assert words in text
+    for words in ("mean radius ratio", "smallest angle", "topological criterion"):
+        assert words in text
+    assert f"{quality.min_angle.min():.6g}" in text
     assert "Defects" not in text
+
+
+def test_info_without_faces(tmp_path):
+    write_mesh(tmp_path / "empty.ply", Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
+    assert run_json("info", tmp_path / "empty.ply")["quality"]["n_faces"] == 0
+    assert "Quality" in run("info", tmp_path / "empty.ply").stdout
+
+
+def test_distance(mesh_path, tmp_path):
+    target = tmp_path / "a.ply"
+    run("simplify", mesh_path, "-o", target, "--max-error", "1%")
+    result = run_json("distance", mesh_path, target, "--tolerance", "0.01%")
+    found = result["distance"]
+    expected = tetsimplify.surface_distance(
+        read_mesh(mesh_path), read_mesh(target), tolerance=found["tolerance"]
+    )
+    assert found["tolerance"] == pytest.approx(1e-4 * result["diagonal"])
+    assert (found["lower"], found["upper"]) == (expected.lower, expected.upper)
+    assert found["b_to_a"]["mean"] == expected.b_to_a.mean
+    assert 0 < found["upper"] <= 0.01 * result["diagonal"] + found["tolerance"]
+    text = run("distance", mesh_path, target).stdout
+    for words in ("from A to B", "at most", "root mean square", "% of diagonal"):
+        assert words in text
+    message = run("distance", mesh_path, target, "--tolerance", "x", exit_code=2).stderr
+    assert "--tolerance must be" in message
 
 
 def test_notes_are_told(tmp_path, mesh_path):
@@ -284,7 +382,12 @@ def test_demo_without_matplotlib_or_folder(tmp_path, monkeypatch):
     assert "there is no folder" in run("demo", "--output-dir", tmp_path / "no", exit_code=1).stderr
 
 
-def test_target_is_checked_before_any_work(volume_path, tmp_path):
+def test_target_and_options_are_checked_before_any_work(volume_path, tmp_path):
+    command = ("simplify", tmp_path / "nothing.ply", "-o", tmp_path / "a.ply")
+    assert "give at least one of" in run(*command, exit_code=2).stderr
+    assert "blocked must" in run(
+        *command, "--target-faces", 9, "--blocked", "maybe", exit_code=2
+    ).stderr  # fmt: skip
     command = ("isosurface", tmp_path / "nothing.npz", "--level", 0, "-o")
     assert "there is no folder" in run(*command, tmp_path / "no" / "a.ply", exit_code=1).stderr
     assert "no suffix of a mesh format" in run(*command, tmp_path / "a.xyz", exit_code=1).stderr
@@ -322,7 +425,10 @@ def test_unexpected_error_is_one_line(mesh_path, monkeypatch):
 def test_version_and_help():
     assert run("--version").stdout == f"tetsimplify {tetsimplify.__version__}\n"
     assert "isosurface" in run("--help").stdout
-    assert "--max-edge-length" in run("simplify", "-h").stdout
+    text = run("simplify", "-h").stdout
+    assert "--max-edge-length" in text
+    for panel in ("What stops it", "Which edges go", "What is held", "Volumes"):
+        assert panel in text
 
 
 def test_progress_is_drawn_on_a_terminal_only():
@@ -343,11 +449,13 @@ def test_plain_values():
 
 
 def test_values():
-    assert values.parse_edge_length("0.5") == (0.5, False)
-    assert values.parse_edge_length("50%") == (0.5, True)
+    assert values.parse_length("--max-error", "0.5") == (0.5, False)
+    assert values.parse_length("--max-error", "50%") == (0.5, True)
+    assert values.parse_ratio("--keep-ratio", "100%") == 1
     assert values.parse_removal_limit("4x", 0.5) == 2.0
     assert values.parse_removal_limit("inf", 0.5) == np.inf
-    assert values.parse_foldover("OFF") is None
+    assert values.parse_or_off("--shape", "OFF", expected="a number") is None
+    assert values.parse_or_off("--shape", "0.5", expected="a number") == 0.5
     assert values.parse_spacing("1, 2,0.5") == (1, 2, 0.5)
     for text in ("1,2", "1,2,0", "1,2,x", "1,2,inf"):
         with pytest.raises(OptionError):

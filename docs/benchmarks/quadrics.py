@@ -127,19 +127,26 @@ class Measured:
     """Why there are no figures."""
 
 
-def run(case: Case, tools: list[Tool], n_faces: int, repeats: int) -> Iterable[tuple[Any, Any]]:
-    """Run all tools in turn, again and again; give names, and the times and first results."""
+def run(
+    case: Case, tools: list[Tool], n_faces: int, repeats: int, patience: float
+) -> Iterable[tuple[str, Times, Any]]:
+    """Run all tools in turn, again and again; give names, times and first results.
+
+    A tool that takes longer than `patience` seconds runs once.
+    """
     small = gyroid(10_000)
     tetsimplify.simplify(*small, target_faces=2_000)
     for tool in tools:
         tool.run(tool.prepare(small), 2_000)
     for repeat in range(repeats):
         times, result = timed(lambda: tetsimplify.simplify(*case.mesh, target_faces=n_faces))
-        yield (NAME, times), None if repeat else (result.vertices, result.faces)
-        for tool in tools:
+        yield NAME, times, None if repeat else (result.vertices, result.faces)
+        for tool in list(tools):
             prepared = tool.prepare(case.mesh)
             times, raw = timed(lambda tool=tool, given=prepared: tool.run(given, n_faces))
-            yield (tool.name, times), None if repeat else tool.finish(raw)
+            yield tool.name, times, None if repeat else tool.finish(raw)
+            if times["cpu"] > patience:
+                tools.remove(tool)
 
 
 def normals(mesh: Mesh) -> NDArray[np.float64]:
@@ -191,13 +198,14 @@ def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: 
 
 
 def compare(
-    case: Case, tools: list[Tool], n_faces: int, repeats: int, console: Console
+    case: Case, tools: list[Tool], n_faces: int, arguments: argparse.Namespace, console: Console
 ) -> list[Measured]:
     """All tools in one case."""
+    repeats, patience = arguments.repeats, arguments.patience
     rows = {name: Measured(name) for name in (NAME, *(tool.name for tool in tools))}
     results = {}
     with one_core():
-        for (name, times), result in run(case, tools, n_faces, repeats):
+        for name, times, result in run(case, list(tools), n_faces, repeats, patience):
             rows[name].times.append(times)
             if result is not None:
                 results[name] = [np.array(array) for array in result]
@@ -300,9 +308,13 @@ def parse() -> argparse.Namespace:
         "--keep", type=float, nargs="*", default=[15.0, 2.0], help="per cent of the faces to keep"
     )
     parser.add_argument("--repeats", type=int, default=5, help="runs of every tool in every case")
+    parser.add_argument(
+        "--patience", type=float, default=np.inf, help="tools slower than so many seconds run once"
+    )
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
     parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
     parser.add_argument("--json", type=Path, help="file to add all figures to")
+    parser.add_argument("--tables", action="store_true", help="tables of that file, no new figures")
     parser.add_argument("--markdown", type=Path, help="file to write the tables to")
     return parser.parse_args()
 
@@ -320,15 +332,16 @@ def main() -> None:
     figures: dict[str, Any] = {"cases": {}}
     if arguments.json and arguments.json.exists():
         figures = json.loads(arguments.json.read_text())
-    figures["clock"] = arguments.clock
-    figures["machine"] = machine()
-    figures["absent"] = [tool.name for tool in wanted if not tool.is_installed]
-    for name in arguments.cases:
+    if not arguments.tables:
+        figures["clock"] = arguments.clock
+        figures["machine"] = machine()
+        figures["absent"] = [tool.name for tool in wanted if not tool.is_installed]
+    for name in () if arguments.tables else arguments.cases:
         case = load(name, arguments)
         before = tetsimplify.topology(*case.mesh)
         for keep in arguments.keep:
             n_faces = round(keep / 100 * before.n_faces)
-            measured = compare(case, tools, n_faces, arguments.repeats, console)
+            measured = compare(case, tools, n_faces, arguments, console)
             figures["cases"][f"{case.name}, cut to {keep:g} %"] = {
                 "n_faces": before.n_faces,
                 "euler_characteristic": before.euler_characteristic,

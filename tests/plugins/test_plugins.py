@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import re
 import subprocess
 import sys
 
@@ -63,6 +64,25 @@ def test_options_reach_the_core(plugin):
         plugin.simplify(torus(plugin), max_edge_length=1.5, nonsense=1)
     with pytest.raises(tetsimplify.OptionError, match="placement"):
         plugin.simplify(torus(plugin), max_edge_length=1.5, placement="nowhere")
+
+
+@pytest.mark.parametrize(
+    "target", [{"target_faces": 400}, {"keep_ratio": 0.2}, {"max_quadric_error": 0.05}]
+)
+def test_targets_reach_the_core(plugin, target):
+    mesh = torus(plugin)
+    before = tetsimplify.topology(mesh)
+    result, report = plugin.simplify(mesh, **target, return_report=True)
+    after = tetsimplify.topology(result)
+    assert [report.stop] == list(target) and after.same_topology(before)
+    wanted = target.get("target_faces", round(target.get("keep_ratio", 0) * before.n_faces))
+    assert "max_quadric_error" in target or wanted <= after.n_faces <= wanted + 2
+    assert tetsimplify.topology(tetsimplify.simplify(mesh, **target)).n_faces == after.n_faces
+
+
+def test_the_page_shows_a_ratio(plugin):
+    page = ROOT / "docs" / "plugins" / f"{name_of(plugin)}.md"
+    assert re.search("keep_ratio=|targetperc=", examples(page))
 
 
 def test_the_examples_on_the_page_run(plugin, tmp_path, monkeypatch):

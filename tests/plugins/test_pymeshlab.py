@@ -155,6 +155,11 @@ def test_percentage_is_of_the_diagonal():
     assert values["maxedgelength"] == pytest.approx(0.05 * diagonal)
     assert values["removallimit"] == pytest.approx(0.2 * diagonal)
     assert values["selected"] is False
+    values = ms.filter_parameter_values(SIMPLIFY)
+    assert values["maxedgelength"] == pytest.approx(0.01 * diagonal)
+    values = ms.filter_parameter_values(SIMPLIFY, targetfacenum=100)
+    assert values["maxedgelength"] is None and values["removallimit"] is None
+    values = ms.filter_parameter_values(SIMPLIFY, maxedgelength=PercentageValue(5))
     other = sphere()
     ms.apply_filter(SIMPLIFY, maxedgelength=PercentageValue(5))
     other.apply_filter(SIMPLIFY, maxedgelength=PureValue(values["maxedgelength"]))
@@ -208,6 +213,54 @@ def test_balloon_that_is_removed():
     mesh = ms.current_mesh()
     new = triangles(mesh.vertex_matrix(), mesh.face_matrix())
     assert np.array_equal(new, triangles(expected.vertices, expected.faces))
+
+
+# --- targets and guards, as in quadric decimation ---------------------------------------------
+
+
+QUADRIC = "meshing_decimation_quadric_edge_collapse"
+
+
+@pytest.mark.parametrize(
+    "target", [{"targetfacenum": 500}, {"targetperc": 0.1}, {"targetfacenum": 9, "targetperc": 0.1}]
+)
+def test_targets_are_those_of_quadric_decimation(target):
+    theirs, ours = sphere(), sphere()
+    theirs.apply_filter(QUADRIC, **target)
+    figures = ours.apply_filter(SIMPLIFY, **target)
+    assert ours.current_mesh().face_number() == theirs.current_mesh().face_number()
+    assert figures["stop"] == ("keep_ratio" if "targetperc" in target else "target_faces")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "options"),
+    [
+        ({}, {}),
+        ({"qualitythr": 0.5}, {"shape": 0.5}),
+        ({"qualitythr": 0.0}, {"shape": None}),
+        ({"preservenormal": True}, {"normal_deviation": 90.0}),
+        ({"preservenormal": False}, {"normal_deviation": None}),
+        ({"preserveboundary": True}, {"boundary": "keep"}),
+        ({"optimalplacement": True}, {"placement": "quadric"}),
+        ({"optimalplacement": False}, {"placement": "endpoint"}),
+        ({"cost": "length"}, {"cost": "length"}),
+        ({"featureangle": 20}, {"feature_angle": 20}),
+        ({"maxquadricerror": PureValue(0.01)}, {"max_quadric_error": 0.01}),
+        ({"maxerror": PureValue(0.02)}, {"max_error": 0.02}),
+        ({"maxedgelength": LENGTH}, {"max_edge_length": 0.15}),
+    ],
+)
+def test_parameters_are_options_of_the_core(parameters, options):
+    vertices, faces, _ = grid()
+    vertices[:, 2] = 0.1 * np.sin(5 * vertices[:, 0]) * np.cos(4 * vertices[:, 1])
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces))
+    figures = ms.apply_filter(SIMPLIFY, targetfacenum=200, **parameters)
+    expected = tetsimplify.simplify(vertices, faces, target_faces=200, **options)
+    mesh = ms.current_mesh()
+    new = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    assert np.array_equal(new, triangles(expected.vertices, expected.faces))
+    assert figures["stop"] == expected.report.stop
 
 
 # --- what a mesh carries -----------------------------------------------------------------------
@@ -356,15 +409,18 @@ def test_selection_of_everything_and_of_vertices():
     assert mesh.selected_vertex_number() == mesh.vertex_number()
 
 
-def test_preserveboundary():
+@pytest.mark.parametrize("criterion", [{"maxedgelength": LENGTH}, {"targetperc": 0.02}])
+@pytest.mark.parametrize("preserve", [False, True])
+def test_preserveboundary(criterion, preserve):
+    """The boundary stays the same curve: a wavy side with all its vertices."""
     vertices, faces, _ = grid()
-    rim = {tuple(p) for p in vertices if not ((0 < p[:2]) & (p[:2] < 1)).all()}
-    for preserve in (False, True):
-        ms = MeshSet()
-        ms.add_mesh(Mesh(vertices, faces))
-        ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH, preserveboundary=preserve)
-        left = {tuple(p) for p in ms.current_mesh().vertex_matrix()}
-        assert (rim <= left) is preserve
+    vertices[:, 1] += 0.02 * np.cos(40 * vertices[:, 0])
+    side = {tuple(p) for p in vertices[:25]}
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces))
+    ms.apply_filter(SIMPLIFY, preserveboundary=preserve, **criterion)
+    left = {tuple(p) for p in ms.current_mesh().vertex_matrix()}
+    assert (side <= left) is preserve
 
 
 def test_polylines_stay():
@@ -531,12 +587,15 @@ def test_no_faces_has_the_message_of_other_filters():
     assert message_of(lambda: ms.apply_filter(SIMPLIFY)) == theirs.replace(OTHER, SIMPLIFY)
 
 
-@pytest.mark.parametrize("name", ["targetfacenum", "targetperc", "qualitythr", "boundaryweight"])
-def test_parameters_of_the_quadric_mode_are_known(name):
-    if name in plugin.FILTERS[SIMPLIFY].live:
-        pytest.skip("the quadric mode is there")
-    message = message_of(lambda: sphere().apply_filter(SIMPLIFY, **{name: 1}))
-    assert name in message and "quadric" in message
+@pytest.mark.parametrize(
+    "name", ["boundaryweight", "planarquadric", "planarweight", "preservetopology", "qualityweight"]
+)
+def test_parameters_that_are_fixed(name):
+    default = plugin.FILTERS[SIMPLIFY].parameters[name].default
+    assert sphere().apply_filter(SIMPLIFY, targetfacenum=100, **{name: default})["genus"] == 0
+    other = not default if isinstance(default, bool) else 2 * default
+    message = message_of(lambda: sphere().apply_filter(SIMPLIFY, **{name: other}))
+    assert message == f"Parameter {name} of filter {SIMPLIFY} can only be {default}."
 
 
 def test_bad_mesh_says_what_is_wrong():
@@ -571,14 +630,16 @@ def test_filters_are_listed(capsys):
         call()
         assert SIMPLIFY in capsys.readouterr().out
     pymeshlab.print_filter_parameter_list(SIMPLIFY)
-    assert "\tmaxedgelength : PercentageValue = 1%\n" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "\tmaxedgelength : PercentageValue = 1% unless there is a target\n" in printed
+    assert "\ttargetfacenum : int = 0\n" in printed and "planarquadric" not in printed
 
 
 def test_page_and_help_tell_of_all_parameters():
     page = (ROOT / "docs" / "plugins" / "pymeshlab.md").read_text(encoding="utf-8")
     for name, each in plugin.FILTERS.items():
         assert f"## `{name}`" in page
-        for parameter in each.live:
+        for parameter in each.parameters:
             assert f"`{parameter}`" in page
 
 

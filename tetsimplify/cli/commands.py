@@ -6,14 +6,14 @@ import signal
 import sys
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from tetsimplify import __version__
 from tetsimplify.cli import tables, values
 from tetsimplify.cli.session import Session, session
+from tetsimplify.cli.wanted import Wanted, diagonal, median_edge
 from tetsimplify.edges import edge_lengths
 from tetsimplify.errors import FileError, MissingExtraError, OptionError, VolumeError
 from tetsimplify.io import (
@@ -36,11 +36,6 @@ CRITERIA = "What stops it: the first of these that is reached, at least one is n
 CONTRACTIONS = "Which edges go, and where the new vertex is"
 GUARDS = "What is held"
 VOLUME_OPTIONS = "Volumes"
-NUMBERS = {
-    "foldover": "an angle in degrees",
-    "normal_deviation": "an angle in degrees",
-    "shape": "a number from 0 to 1",
-}
 
 app = typer.Typer(
     name="tetsimplify",
@@ -265,30 +260,25 @@ def simplify(
     """
     with session("simplify", as_json=as_json, quiet=quiet, debug=debug) as this:
         check_target(output)
-        lengths = {
-            "max_edge_length": max_edge_length,
-            "max_error": max_error,
-            "max_quadric_error": max_quadric_error,
-        }
-        numbers = {"foldover": foldover, "normal_deviation": normal_deviation, "shape": shape}
-        others = {
-            "target_faces": target_faces,
-            "keep_ratio": keep_ratio and values.parse_ratio("--keep-ratio", keep_ratio),
-            "cost": cost,
-            "placement": placement,
-            "blocked": blocked,
-            "outer": outer,
-            "boundary": boundary,
-            "feature_angle": feature_angle,
-        }
-        wanted = _Wanted(
-            lengths={k: values.parse_length(_dashed(k), v) for k, v in lengths.items() if v},
-            removal_limit=removal_limit,
-            others={name: value for name, value in others.items() if value is not None}
-            | {k: values.parse_or_off(_dashed(k), v, NUMBERS[k]) for k, v in numbers.items() if v},
+        wanted = Wanted(
+            {
+                "max_edge_length": max_edge_length,
+                "target_faces": target_faces,
+                "keep_ratio": keep_ratio,
+                "max_error": max_error,
+                "max_quadric_error": max_quadric_error,
+                "cost": cost,
+                "placement": placement,
+                "blocked": blocked,
+                "outer": outer,
+                "removal_limit": removal_limit,
+                "boundary": boundary,
+                "feature_angle": feature_angle,
+                "foldover": foldover,
+                "normal_deviation": normal_deviation,
+                "shape": shape,
+            }
         )
-        wanted.check()
-
         volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
         mesh = _read(this, source, level, key, spacing, volume_options)
         result = _simplify(this, mesh, repair=repair, **wanted.options(mesh))
@@ -353,27 +343,27 @@ def distance(
 ) -> None:
     """Measure the distance between two surfaces, both ways."""
     with session("distance", as_json=as_json, quiet=quiet, debug=debug) as this:
-        given = tolerance and values.parse_length("--tolerance", tolerance)
+        number, is_relative = 0.0, False
+        if tolerance is not None:
+            number, is_relative = values.parse_length("--tolerance", tolerance)
         with this.stage("read"):
             first, second = read_mesh(a), read_mesh(b)
-        diagonal = _diagonal(first)
-        number, is_relative = given or (None, False)
-        if number is not None and is_relative:
-            number *= diagonal
+        whole = diagonal(first)
 
         from tetsimplify.distance import surface_distance
 
         with this.stage("distance"):
-            found = surface_distance(first, second, tolerance=number, progress=this.progress)
+            bound = None if tolerance is None else number * (whole if is_relative else 1.0)
+            found = surface_distance(first, second, tolerance=bound, progress=this.progress)
         this.finish(
             {
                 **_header(this, a),
                 "other": b,
                 "distance": tables.distance_as_dict(found),
-                "diagonal": diagonal,
+                "diagonal": whole,
                 "seconds": this.seconds,
             },
-            tables.distance_table(found, diagonal),
+            tables.distance_table(found, whole),
             tables.seconds_table(this.seconds),
         )
 
@@ -399,7 +389,7 @@ def demo(
         check_target(mesh_path)
         with this.stage("extract"):
             before = work.extract_brain(this.progress)
-        length = work.MEDIAN_EDGES * float(np.median(edge_lengths(before)))
+        length = work.MEDIAN_EDGES * median_edge(before)
         result = _simplify(this, before, max_edge_length=length)
         after = Mesh(result.vertices, result.faces)
         _write(this, mesh_path, after)
@@ -423,58 +413,6 @@ def demo(
             tables.headline(result.report),
             _wrote(this),
         )
-
-
-class _Wanted(NamedTuple):
-    """What `simplify` is asked to do, before the mesh is known."""
-
-    lengths: dict[str, tuple[float, bool]]
-    """Numbers, and whether they are parts of a length of the mesh."""
-    removal_limit: str | None
-    others: dict[str, Any]
-
-    def check(self) -> None:
-        """Complain before any work."""
-        from tetsimplify.options import CRITERIA as NAMES
-        from tetsimplify.options import Options
-
-        options = self._options({name: number for name, (number, _) in self.lengths.items()})
-        if not options.keys() & set(NAMES):
-            raise OptionError(f"give at least one of {', '.join(map(_dashed, NAMES))}")
-        Options(**options)
-
-    def options(self, mesh: Mesh) -> dict[str, Any]:
-        """The options of the library for a mesh."""
-        lengths = {}
-        for name, (number, is_relative) in self.lengths.items():
-            unit = 1.0
-            if is_relative:
-                unit = _median_edge(mesh) if name == "max_edge_length" else _diagonal(mesh)
-            lengths[name] = number * unit
-        return self._options(lengths)
-
-    def _options(self, lengths: dict[str, float]) -> dict[str, Any]:
-        options = {**lengths, **self.others}
-        if self.removal_limit is not None:
-            length = lengths.get("max_edge_length")
-            options["removal_limit"] = values.parse_removal_limit(self.removal_limit, length)
-        return options
-
-
-def _dashed(name: str) -> str:
-    """An option of the library as one of the command line."""
-    return f"--{name.replace('_', '-')}"
-
-
-def _median_edge(mesh: Mesh) -> float:
-    lengths = edge_lengths(mesh)
-    return float(np.median(lengths)) if len(lengths) else 0.0
-
-
-def _diagonal(mesh: Mesh) -> float:
-    """The diagonal of the bounding box of the faces."""
-    corners = mesh.vertices[mesh.faces.reshape(-1)]
-    return float(np.linalg.norm(np.ptp(corners, axis=0))) if len(corners) else 0.0
 
 
 def _header(this: Session, source: Path | str) -> dict[str, Any]:

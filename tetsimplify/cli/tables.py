@@ -34,7 +34,6 @@ COUNTS = {
     "n_boundary_loops": "boundary loops",
     "n_boundary_edges": "boundary edges",
 }
-STOPS = {"exhausted": "topology and guards", "max_edge_length": "edge length"}
 FIRST = 10  # defects that are listed one by one
 
 
@@ -127,11 +126,9 @@ def lengths_table(lengths: NDArray[np.float64]) -> Table:
 
 def quality_table(report: QualityReport) -> Table:
     """The criteria that tell most, and what would be ideal."""
-    ratio = report.radius_ratio.mean() if report.n_faces else 0.0
-    angle = report.min_angle.min(initial=np.inf) if report.n_faces else 0.0
     made = table("Quality", "", "value", "ideal")
-    made.add_row("mean radius ratio", counted(float(ratio)), "1")
-    made.add_row("smallest angle", f"{angle:.6g}°", "60°")
+    made.add_row("mean radius ratio", counted(report.summary("radius_ratio").mean), "1")
+    made.add_row("smallest angle in degrees", counted(report.summary("min_angle").min), "60")
     made.add_row("topological criterion", counted(report.topological_criterion), "0")
     return made
 
@@ -182,6 +179,13 @@ def simplification_as_dict(report: SimplificationReport) -> dict[str, Any]:
     }
 
 
+def stopped_by(report: SimplificationReport) -> str:
+    """The criterion that was reached, as words."""
+    if report.stop == "exhausted":
+        return "topology and guards"
+    return report.stop.replace("_", " ")
+
+
 def headline(report: SimplificationReport) -> str:
     """What came of a simplification, in one line."""
     before, after = report.topology_before, report.topology_after
@@ -206,7 +210,7 @@ def simplification_tables(report: SimplificationReport, seconds: dict[str, float
     work.add_row("sweeps", counted(report.n_sweeps))
     if report.n_rounds > 1:
         work.add_row("rounds", counted(report.n_rounds))
-    work.add_row("stopped by", STOPS.get(report.stop, report.stop.replace("_", " ")))
+    work.add_row("stopped by", stopped_by(report))
     tables = [topologies, work]
     if report.options.max_edge_length is not None:
         tables.append(_remaining_table(report, report.options.max_edge_length))

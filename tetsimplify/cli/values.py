@@ -57,7 +57,7 @@ def parse_removal_limit(text: str, max_edge_length: float | None) -> float:
     return number * max_edge_length
 
 
-def parse_or_off(option: str, text: str, expected: str) -> float | None:
+def parse_or_off(option: str, text: str, *, expected: str) -> float | None:
     """Read a number, or ``off``."""
     return None if text.lower() == "off" else _number(option, text, f"{expected}, or off")
 
