@@ -16,8 +16,8 @@ from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
 from tetsimplify.intersections import self_intersections
 from tetsimplify.kernels.corners import DEAD, ahead
-from tetsimplify.kernels.cost import squared_length
 from tetsimplify.kernels.crossing import faces_cross
+from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.intersections import watch_over
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.placement import find_place
@@ -388,7 +388,8 @@ def find_crossing(watch, surface, scratch, rules, corner):
     lens = keep_one_lens(surface, scratch, rules, None, corner)
     if lens.outcome != CONTRACTIBLE:
         return -1
-    if not find_place(surface, scratch, rules, v, u, lens.n_v, lens.n_u):
+    placed = find_place(surface, None, scratch, rules, v, u, lens.n_v, lens.n_u)
+    if placed != CONTRACTIBLE:
         return -1
     return int(star_crosses(watch, surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed))
 
@@ -402,7 +403,7 @@ def contract(watch, surface, scratch, rules, corner):
     surface.verdict[corner] = NESTED
     scratch.lists[DEFERRED, 0] = face
     scratch.tally[N_DEFERRED] = 1
-    unblock(surface, scratch, rules, None, SETTLED, True)
+    unblock(surface, None, None, scratch, rules, None, None, SETTLED, True)
     star = scratch.lists[STAR_V]
     n = 1
     corner = surface.next_corner[star[0]]
@@ -432,7 +433,7 @@ class Run:
 
     def __init__(self, mesh, *, max_edge_length=np.inf, places=(0.5,)):
         vertices, faces = as_mesh(*mesh)
-        options = Options(max_edge_length, removal_limit=np.inf, foldover=None)
+        options = Options(max_edge_length=max_edge_length, removal_limit=np.inf, foldover=None)
         engine = Engine(as_mesh(vertices, faces), options, np.zeros(len(vertices), bool))
         self.surface, self.scratch = engine._surface, engine._scratch
         self.rules = engine.rules._replace(places=np.array(places))

@@ -173,9 +173,8 @@ def n_flipped(result: Mesh, target: Target, given: NDArray[np.float64]) -> int:
     return int((np.einsum("ij,ij->i", normals(result), given[nearest]) < 0.0).sum())
 
 
-def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: Any) -> None:
-    """Measure a result."""
-    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+def look_at(measured: Measured, case: Case, target: Target, result: Mesh) -> None:
+    """Measure the topology of a mesh and its faces."""
     found = tetsimplify.topology(*result)
     measured.n_faces = found.n_faces
     measured.euler_characteristic = found.euler_characteristic
@@ -188,6 +187,12 @@ def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: 
     measured.slivers = int((shape.radius_ratio < SLIVER).sum())
     measured.needles = int((shape.radius_ratio < NEEDLE).sum())
     measured.flipped_faces = n_flipped(result, target, normals(case.mesh))
+
+
+def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: Any) -> None:
+    """Measure a result."""
+    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+    look_at(measured, case, target, result)
     unit = case.diagonal
     distance = tetsimplify.surface_distance(result, case.mesh, tolerance=TOLERANCE * unit)
     measured.mean_to_input = distance.a_to_b.mean / unit
@@ -195,6 +200,13 @@ def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: 
     measured.mean = (measured.mean_to_input + measured.mean_from_input) / 2
     measured.rms = distance.rms / unit
     measured.max_lower, measured.max_upper = distance.lower / unit, distance.upper / unit
+
+
+def given(case: Case) -> Measured:
+    """The figures of the input itself."""
+    measured = Measured("the input")
+    look_at(measured, case, Target(case.mesh), case.mesh)
+    return measured
 
 
 def compare(
@@ -222,25 +234,31 @@ def compare(
 # --- telling ---------------------------------------------------------------------------------
 
 
+def number(value: float) -> str:
+    """Three digits, or all before the point."""
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
 def median_seconds(tool: dict[str, Any], clock: str) -> float:
     """Median time of a tool."""
     return statistics.median(seconds_of(tool["times"], clock))
 
 
-def comparison_rows(tools: list[dict[str, Any]], clock: str) -> list[Row]:
-    """The table of one case."""
+def comparison_rows(tools: list[dict[str, Any]], given: dict[str, Any], clock: str) -> list[Row]:
+    """The table of one case: all tools, and the input."""
     ours = tools[0]
 
     def row(tool: dict[str, Any]) -> Row:
         seconds: Seconds = seconds_of(tool["times"], clock)
+        took = median_seconds(tool, clock) / median_seconds(ours, clock) if seconds else 0.0
         return {
             "tool": tool["tool"],
-            "seconds, median (min to max)": spread(seconds),
-            "ratio": f"{statistics.median(seconds) / median_seconds(ours, clock):.2f}",
+            "seconds, median (min to max)": spread(seconds) if seconds else "",
+            "ratio": f"{took:.2f}" if seconds else "",
             "faces": f"{tool['n_faces']:,}",
-            "mean": f"{tool['mean'] / UNIT:.3g}",
-            "to ours": f"{tool['mean'] / ours['mean']:.2f}",
-            "max": f"{tool['max_upper'] / UNIT:,.0f}",
+            "mean": number(tool["mean"] / UNIT) if seconds else "",
+            "to ours": number(tool["mean"] / ours["mean"]) if seconds else "",
+            "max": number(tool["max_upper"] / UNIT) if seconds else "",
             "mean 2r/R": f"{tool['radius_ratio']:.4f}",
             "2r/R < 0.1": f"{100 * tool['slivers'] / max(1, tool['n_faces']):.2f} %",
             "edges of degree > 2": f"{tool['edges_of_degree_above_2']:,}",
@@ -249,7 +267,7 @@ def comparison_rows(tools: list[dict[str, Any]], clock: str) -> list[Row]:
             "same topology": "yes" if tool["same_topology"] else "no",
         }
 
-    return [row(tool) for tool in tools if tool["error"] is None]
+    return [row(tool) for tool in (*tools, given) if tool["error"] is None]
 
 
 def short_rows(cases: dict[str, Any], clock: str) -> list[Row]:
@@ -260,7 +278,7 @@ def short_rows(cases: dict[str, Any], clock: str) -> list[Row]:
 
         def part(key: str, name: str) -> str:
             tool = others.get(name)
-            return f"{ours[key] / tool[key]:.2f}" if tool and tool["error"] is None else ""
+            return number(ours[key] / tool[key]) if tool and tool["error"] is None else ""
 
         def time_part(name: str) -> str:
             if name not in others:
@@ -289,7 +307,7 @@ def tables_of(figures: dict[str, Any]) -> list[tuple[str, list[Row]]]:
         chi = f"{case['euler_characteristic']:,}".replace("-", "\N{MINUS SIGN}")
         mended = "" if case["repaired"] is None else ", repaired first"
         heading = f"{title}: {case['n_faces']:,} faces, χ = {chi}{mended}"
-        tables.append((heading, comparison_rows(case["tools"], figures["clock"])))
+        tables.append((heading, comparison_rows(case["tools"], case["input"], figures["clock"])))
     return [
         *tables,
         ("tetsimplify over the others", short_rows(figures["cases"], figures["clock"])),
@@ -349,6 +367,7 @@ def main() -> None:
                 "n_boundary_loops": before.n_boundary_loops,
                 "repaired": case.repaired,
                 "diagonal": case.diagonal,
+                "input": asdict(given(case)),
                 "tools": [asdict(row) for row in measured],
             }
             if arguments.json:
