@@ -1,5 +1,7 @@
 """Real meshes and volumes: the topology is kept, and no contractible short edge is left."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,18 @@ def component_of(faces, faces_of, vertex, most=200):
     return faces[sorted(found)]
 
 
+def check_target(mesh, **options):
+    """To a part of the faces by quadric error: topology kept, the number not overshot."""
+    wanted = math.ceil(0.15 * len(mesh.faces))
+    result = tetsimplify.simplify(*mesh, target_faces=wanted, **options)
+    report = result.report
+    assert report.topology_after.same_topology(report.topology_before)
+    assert set(report.topology_after.edge_degrees) <= {1, 2}
+    assert len(result.faces) >= wanted
+    if report.stop == "target_faces":
+        assert len(result.faces) <= wanted + 1
+
+
 @needs_data
 @pytest.mark.parametrize("path", named(MESHES))
 def test_meshes(path):
@@ -75,6 +89,7 @@ def test_meshes(path):
         with pytest.raises(tetsimplify.MeshError, match="no consistently oriented 2-manifold"):
             tetsimplify.simplify(*mesh, max_edge_length=1.0)
     check(mesh, 1.2, repair=not is_manifold)
+    check_target(mesh, repair=not is_manifold)
     if len(mesh.faces) < 300_000:
         check(mesh, 4.0, repair=not is_manifold, foldover=None, removal_limit=np.inf)
 
@@ -87,4 +102,5 @@ def test_volumes(path):
         level = 0.5 if np.isnan(level) else level
         mesh = tetsimplify.extract_isosurface(stored["data"], level, spacing=stored["spacing"])
     check(mesh, 1.2)
+    check_target(mesh)
     check(mesh, 3.0, foldover=None, removal_limit=np.inf)
