@@ -24,6 +24,7 @@ FACES_AT_ONCE = 2**20  # between two calls of `progress`
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
 SHARES = (0.1, 0.02)  # of the edges are below the threshold of a sweep; the second near the end
+NOTHING = 1e-7  # of the diagonal: a quadric error or a length that is as good as none
 SAMPLE = 2**14  # faces whose costs tell what the threshold is
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
 DECISION_STEPS = (100_000, 2)  # steps of region growing to tell obstructed from too large:
@@ -184,7 +185,7 @@ class Engine:
     def _run_by_cost(self, progress: Progress | None) -> None:
         """Contract the cheapest edges first: sweeps with a threshold that grows."""
         state = kernels.state
-        n_given, threshold, n_barren, retry = self.n_faces, 0.0, 0, False
+        n_given, threshold, n_barren, retry = self.n_faces, self._smallest_threshold(), 0, False
         self.rank()
         while not self.has_enough:
             threshold = self.next_threshold(threshold, n_barren)
@@ -211,6 +212,17 @@ class Engine:
         """Bring the costs of the edges up to date."""
         n_faces = len(self._face_origin)
         kernels.cost.rank(self._surface, self._quadrics, self.rules, self._cost, 0, n_faces)
+
+    def _smallest_threshold(self) -> float:
+        """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
+        vertices = self._surface.vertices
+        nothing2 = (
+            NOTHING**2 * float((np.ptp(vertices, axis=0) ** 2).sum()) if self.n_faces else 0.0
+        )
+        if self._quadrics is None or self.rules.by_length:
+            return nothing2
+        mean_area = float(self._quadrics.normals[:, 3].sum()) / (3 * max(1, self.n_faces))
+        return nothing2 * mean_area
 
     def next_threshold(self, threshold: float, n_barren: int = 0) -> float:
         """A cost that some share of the edges are below, and no more than have to go.
