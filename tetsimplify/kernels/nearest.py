@@ -22,7 +22,7 @@ from tetsimplify.kernels.jit import cold_part, part
 
 RESOLUTION = 1e-13  # smaller distances are made of rounding errors: they count as none
 
-# Below this squared sine of the angle at the first corner the usual normal has lost digits.
+# Where the squared sine of the angle between two edges is smaller, the normal has few good digits.
 SLIVER = 1e-5
 
 

@@ -200,11 +200,9 @@ def _crosses_others(watch, surface, scratch, move):
                     continue
                 if turns and _is_beyond(vertices, a, b, move):
                     continue
-                if not faces_cross(vertices, a, b):
+                if not faces_cross(vertices, a, b) or _is_doomed(scratch, move, g):
                     continue
-                if not _is_doomed(scratch, move, g) and not _crossed(
-                    surface, move, star[i] // 3, g
-                ):
+                if not _crossed(surface, move, star[i] // 3, g):
                     return True
     return False
 
@@ -271,7 +269,7 @@ def _is_doomed(scratch, move, face):
 
 @inlined
 def _crossed(surface, move, f, g):
-    """Whether two faces crossed before."""
+    """Whether two faces crossed while v was in its old place."""
     vertices = surface.vertices
     new = vertices[move.v, 0], vertices[move.v, 1], vertices[move.v, 2]
     _put(vertices, move.v, move.old)
