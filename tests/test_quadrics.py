@@ -561,6 +561,10 @@ def test_empty_and_tiny_meshes(mesh, cost):
         ({"keep_ratio": 0.5, "cost": "curvature"}, "cost must be one of 'auto', 'length'"),
         ({"keep_ratio": 0.5, "boundary": "free"}, "boundary must be one of 'simplify', 'keep'"),
         ({"keep_ratio": 0.5, "intersections": "fix"}, "intersections must be one of 'allow'"),
+        (
+            {"keep_ratio": 0.5, "intersections": "prevent", "blocked": "violate"},
+            "intersections='prevent' needs a topology that is kept",
+        ),
         ({"keep_ratio": 0.5, "shape": 1.5}, "shape must be from 0 to 1"),
         ({"keep_ratio": 0.5, "normal_deviation": "off"}, "normal_deviation must be a number"),
         (

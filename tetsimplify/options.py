@@ -99,6 +99,8 @@ class Options:
         _check_choice("outer", self.outer, OUTER)
         _check_choice("boundary", self.boundary, BOUNDARIES)
         _check_choice("intersections", self.intersections, INTERSECTIONS)
+        if self.intersections == "prevent" and self.blocked == "violate":
+            raise OptionError("intersections='prevent' needs a topology that is kept")
         if not any(getattr(self, name) is not None for name in CRITERIA):
             raise OptionError(f"give at least one of {', '.join(CRITERIA)}")
         if self.feature_angle is not None and self.by_length:
