@@ -18,6 +18,7 @@ from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
 from tetsimplify.options import BLOCKED, BOUNDARIES, PLACEMENTS, Options
+from tetsimplify.schedule import next_thresholds, run
 
 OFF = {"foldover": None, "normal_deviation": None, "shape": None}
 MODES = [
@@ -85,9 +86,9 @@ def tube(n_around=48, n_along=24):
 
 def quadrics_of(vertices, faces):
     mesh = as_mesh(vertices, faces)
-    terms, normals = np.zeros((len(mesh.vertices), 10)), np.zeros((len(mesh.vertices), 4))
-    kernels.quadrics.add_faces(mesh.vertices, mesh.faces.reshape(-1), terms, normals)
-    return terms, normals
+    quadrics = np.zeros((len(mesh.vertices), kernels.quadrics.WIDTH))
+    kernels.quadrics.add_faces(mesh.vertices, mesh.faces.reshape(-1), quadrics)
+    return quadrics
 
 
 def matrix(q):
@@ -107,7 +108,7 @@ def test_the_quadric_of_an_edge_is_the_sum_over_its_planes(offset):
     rng = np.random.default_rng(3)
     vertices, faces = meshes.icosphere(2)
     vertices = vertices + offset
-    terms, _ = quadrics_of(vertices, faces)
+    terms = quadrics_of(vertices, faces)
     planes = naive_quadrics.planes_of(vertices, faces)
     for v, u in naive.all_edges(faces)[:40]:
         point = 0.5 * (vertices[v] + vertices[u]) + rng.normal(scale=0.1, size=3)
@@ -120,7 +121,7 @@ def test_the_optimum_is_where_the_planes_meet():
     for offset in (0.0, 1e6):
         corner = np.array([0.3, -0.2, 0.7])
         vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]) + offset
-        terms = np.zeros((2, 10))
+        terms = np.zeros((2, kernels.quadrics.WIDTH))
         for axis in range(3):
             terms[0, (0, 3, 5)[axis]] += 1.0
             terms[0, 6 + axis] -= corner[axis]
@@ -132,7 +133,7 @@ def test_the_optimum_is_where_the_planes_meet():
 
 def test_the_optimum_is_the_middle_where_the_planes_do_not_decide():
     """One plane: the middle of the edge, dropped on the plane; also where nothing is known."""
-    terms = np.zeros((2, 10))
+    terms = np.zeros((2, kernels.quadrics.WIDTH))
     vertices = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 0.0]])
     q = kernels.quadrics.sum_at.py_func(terms, vertices, 0, 1)
     assert kernels.quadrics.optimum.py_func(q, 1.0, 1.0, 0.0) == (1.0, 1.0, 0.0)
@@ -150,7 +151,7 @@ def test_errors_of_the_result_are_those_of_the_planes_merged():
         vertices = vertices + offset
         options = Options(keep_ratio=0.1)
         engine = Engine(as_mesh(vertices, faces), options, np.zeros(len(vertices), bool))
-        engine.run()
+        run(engine)
         assert engine.tally("N_NESTED") == 0
         expected = naive_quadrics.rms_errors(vertices, faces, engine.result)
         assert expected.max() > 0.01
@@ -222,9 +223,10 @@ def test_invariants_after_every_sweep(cost, blocked):
         threshold, n_barren = 0.0, 0
         for _ in range(400):
             engine.rank()
-            threshold = engine.next_threshold(threshold, n_barren)
+            thresholds = next_thresholds(engine, threshold, n_barren)
+            threshold = thresholds[-1]
             n_before = engine.n_faces
-            n_contracted = engine.sweep_ranked(threshold)
+            n_contracted = engine.sweep_ranked(thresholds)
             live = engine.mesh()
             assert engine.n_faces == len(live.faces)
             assert (engine.n_faces < n_before) == (n_contracted > 0)

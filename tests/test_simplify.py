@@ -12,7 +12,7 @@ import meshes
 import naive
 import strategies
 import tetsimplify
-from tetsimplify import kernels
+from tetsimplify import blocks, kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
 from tetsimplify.options import BLOCKED, OUTER, PLACEMENTS, Options
@@ -237,8 +237,9 @@ def test_foldover_guard_bounds_the_turn_of_every_face():
     turned = 0
     previous = normals_of(engine)
     for first in range(len(faces)):
-        surface = engine._surface, None, None, engine._scratch, engine.rules
-        if kernels.sweep.sweep(*surface, first, first + 1, kernels.state.STALE_EVEN, True) == 0:
+        bundles = engine._surface, None, None, engine._scratch, engine.rules, engine._listed
+        one_face = blocks.parts(len(faces), 1)[first : first + 1]
+        if kernels.sweep.sweep(*bundles, one_face, 1, kernels.state.STALE_EVEN, True) == 0:
             continue  # one contraction at a time, because two may turn the same face
         current = normals_of(engine)
         for face in current.keys() & previous.keys():
@@ -453,9 +454,9 @@ def test_lens_marks_start_anew(monkeypatch):
     options = {"max_edge_length": 1e6, "foldover": None, "removal_limit": np.inf}
     for seed in range(40):
         mesh = strategies.adversarial_mesh(seed)
-        monkeypatch.setattr("tetsimplify.engine.STAMP_LIMIT", 2**30)
+        monkeypatch.setattr("tetsimplify.start.STAMP_LIMIT", 2**30)
         expected = tetsimplify.simplify(*mesh, **options)
-        monkeypatch.setattr("tetsimplify.engine.STAMP_LIMIT", 5)
+        monkeypatch.setattr("tetsimplify.start.STAMP_LIMIT", 5)
         assert np.array_equal(tetsimplify.simplify(*mesh, **options).faces, expected.faces)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import TypeVar
 
 from tetsimplify.errors import OptionError
@@ -29,6 +30,10 @@ class Crew:
     n_tasks : int
         How many tasks there will be.
 
+    Attributes
+    ----------
+    n_threads : int
+
     Raises
     ------
     OptionError
@@ -47,7 +52,7 @@ class Crew:
             threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
             raise OptionError(f"threads must be a positive integer, got {threads!r}")
-        self._threads = threads
+        self.n_threads = threads
         self._progress = progress
         self._name = name
         self._n_tasks = n_tasks
@@ -57,13 +62,15 @@ class Crew:
         """Do a task for so many items at once; return what comes of each part, in their order."""
         parts = [slice(k, min(k + at_once, n_items)) for k in range(0, n_items, at_once)]
         results = []
-        with ThreadPoolExecutor(self._threads) as pool:
+        n_threads = min(self.n_threads, len(parts))
+        with ThreadPoolExecutor(n_threads) if n_threads > 1 else nullcontext() as pool:
             try:
-                for result in pool.map(task, parts):
+                for result in map(task, parts) if pool is None else pool.map(task, parts):
                     results.append(result)
                     self._tell(self._n_done + len(results) / len(parts))
             finally:  # where something was raised, above all by `progress`
-                pool.shutdown(cancel_futures=True)
+                if pool is not None:
+                    pool.shutdown(cancel_futures=True)
         self._n_done += 1
         return results
 

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from functools import cached_property
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import blocks, kernels
+from tetsimplify.crew import Crew
 from tetsimplify.data import VertexWeights
-from tetsimplify.errors import MeshError
+from tetsimplify.locality import as_given, by_locality
 from tetsimplify.mesh import Mesh
-from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options, Progress
-from tetsimplify.topology import TopologyReport, analyse
+from tetsimplify.options import Options, Progress
+from tetsimplify.start import start_quadrics, start_scratch, start_surface
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.intersections import Watch
-    from tetsimplify.kernels.state import Quadrics, Rules, Scratch
+    from tetsimplify.kernels.state import Rules, Scratch, Surface
 
-FACES_AT_ONCE = 2**20  # between two calls of `progress`
-STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
-FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-SHARES = (0.1, 0.02)  # of the edges are below the threshold of a sweep; the second near the end
+FACES_AT_ONCE = 2**20  # between two calls of `progress`, where there are no blocks
+LEAST_BLOCKS = 4  # a surface of fewer is not divided
+LEAST_SPARE = 64  # faces a block on the average: with fewer to go the surface is not divided
+MOST_SWEEPS = 8  # over a block below one length, before its edges to others have their turn
 NOTHING = 1e-8  # of the diagonal: a quadric error or a length that is as good as none
 SAMPLE = 2**14  # faces whose costs tell what the threshold is
-STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
 DECISION_STEPS = (100_000, 2)  # steps of region growing to tell obstructed from too large:
 # so many, and so many for each face
 
@@ -47,6 +48,14 @@ class Result(NamedTuple):
     merged into it; empty without quadrics."""
 
 
+class _Done(NamedTuple):
+    """What a task has done."""
+
+    tally: NDArray[np.int64]
+    merges: NDArray[np.float64]
+    deferred: NDArray[np.int32]
+
+
 class Engine:
     """Contracts edges of an oriented manifold.
 
@@ -58,10 +67,14 @@ class Engine:
     locked : ndarray, shape (n,), bool
     bound : ndarray, shape (n,), float64, optional
         Largest quadric error that each vertex may come to, instead of that of the options.
+    threads : int, optional
+        None for as many as the process may use. The result does not depend on it.
 
     Attributes
     ----------
     topology_before : TopologyReport
+    min_faces : int
+        So many faces are to be left.
 
     Raises
     ------
@@ -75,85 +88,60 @@ class Engine:
         options: Options,
         locked: NDArray[np.bool_],
         bound: NDArray[np.float64] | None = None,
+        threads: int | None = None,
     ) -> None:
         n, m = len(mesh.vertices), len(mesh.faces)
-        corner_vertex = mesh.faces.reshape(-1).copy()
-        corners = kernels.corners.link_corners(corner_vertex, n)
-        self.topology_before, loop = analyse(corner_vertex, *corners)
-        _refuse(self.topology_before)
-        self.options, self.rules = options, options.rules(m)
-        self._outer = options.outer_code()
-        self.n_sweeps = 0
-        n_loops = self.topology_before.n_boundary_loops
-        self._surface = kernels.state.Surface(
-            vertices=mesh.vertices.copy(),
-            corner_vertex=corner_vertex,
-            next_corner=corners[1],
-            face_state=np.full(m, kernels.state.STALE_ODD, np.uint8),
-            verdict=np.zeros(3 * m, np.uint8),
-            merged_into=np.arange(n, dtype=np.int32),
-            loop=loop,
-            loop_size=kernels.result.count_loop_edges(loop, n_loops),
-            locked=locked | self._held_boundary(mesh.vertices, corner_vertex, corners[1], loop),
-            merges=np.empty((n, 2)),
+        self._may_divide = (
+            m >= LEAST_BLOCKS * blocks.FACES
+            and options.blocked != "violate"
+            and options.intersections == "allow"
         )
-        self._quadrics = self._build_quadrics(bound) if options.uses_quadrics else None
-        self._cost = None if options.has_one_threshold else np.empty(3 * m, np.float32)
+        self._arranged = by_locality(mesh) if self._may_divide else as_given(mesh)
+        self._surface, self.topology_before = start_surface(mesh, self._arranged, options, locked)
+        self._quadrics = None
+        if options.uses_quadrics:
+            arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
+            self._quadrics = start_quadrics(self._surface, options, arranged_bound)
+        self._cost = None if options.has_one_threshold else np.full(3 * m, np.inf, np.float32)
+        self._face_origin = self._arranged.face_origin
+        self._listed = np.arange(m, dtype=np.int32)
+        self._cells = blocks.two_ways(self._arranged.mesh) if self._may_divide else None
+        self.options, self.rules = options, options.rules()
+        self._outer = options.outer_code()
+        self.min_faces = options.fewest_faces(m)
+        self.n_sweeps = 0
         self._watch = self._new_watch()
-        self._face_origin = np.arange(m, dtype=np.int32)
-        self._scratch = _scratch(m, n + n_loops)
+        n_coned = n + self.topology_before.n_boundary_loops
+        self._scratch = start_scratch(m, n_coned, n_coned)
+        self._scratch.tally[kernels.state.N_LIVE] = m
+        self._idle: SimpleQueue[Scratch] = SimpleQueue()
+        self._threads = Crew(threads).n_threads
 
     @property
     def n_faces(self) -> int:
         """Number of live faces."""
-        return int(self._scratch.tally[kernels.state.N_LIVE])
+        return self.tally("N_LIVE")
+
+    @property
+    def has_enough(self) -> bool:
+        """Whether one more contraction would leave fewer faces than are asked for."""
+        return self.min_faces > 0 and self._n_spare < 2
+
+    @property
+    def is_divided(self) -> bool:
+        """Whether sweeps go over blocks, and leave what lies between them to the next one."""
+        n_blocks = self.n_faces // blocks.FACES
+        is_large = n_blocks >= LEAST_BLOCKS and self._n_spare >= LEAST_SPARE * n_blocks
+        return self._may_divide and is_large
+
+    @property
+    def _n_spare(self) -> int:
+        """How many faces may still go."""
+        return self.n_faces - self.min_faces if self.min_faces else blocks.UNLIMITED
 
     def tally(self, name: str) -> int:
         """One of the counters of :mod:`tetsimplify.kernels.state`, by its name."""
         return int(self._scratch.tally[getattr(kernels.state, name)])
-
-    def _held_boundary(
-        self,
-        vertices: NDArray[np.float64],
-        corner_vertex: NDArray[np.int32],
-        next_corner: NDArray[np.int32],
-        loop: NDArray[np.int32],
-    ) -> NDArray[np.bool_]:
-        """Boundary vertices that have to stay: all, or those where the boundary turns."""
-        held: NDArray[np.bool_] = loop >= 0
-        if self.options.boundary == "simplify" or not held.any():
-            return np.zeros_like(held)
-        if self.options.boundary == "keep":
-            before, after = np.arange(len(loop)), np.arange(len(loop))
-            kernels.rings.boundary_neighbours(corner_vertex, next_corner, loop, before, after)
-            come, go = vertices - vertices[before], vertices[after] - vertices
-            ahead = np.einsum("ij,ij->i", come, go)
-            aside = np.linalg.norm(np.cross(come, go), axis=1)
-            held &= (ahead <= 0.0) | (aside > STRAIGHT * ahead)
-        return held
-
-    def _build_quadrics(self, bound: NDArray[np.float64] | None) -> Quadrics:
-        """The quadrics of all faces, and of boundary and feature edges."""
-        options, surface = self.options, self._surface
-        n = len(surface.vertices)
-        limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
-        quadrics: Quadrics = kernels.state.Quadrics(
-            terms=np.zeros((n, kernels.quadrics.N_TERMS)),
-            normals=np.zeros((n, 4)),
-            max_error2=np.full(n, float(limit)) if bound is None else bound.copy(),
-        )
-        quadrics.max_error2[:] *= np.abs(quadrics.max_error2)  # negative ones stay negative
-        kernels.quadrics.add_faces(
-            surface.vertices, surface.corner_vertex, quadrics.terms, quadrics.normals
-        )
-        sharp = -1.0
-        if options.feature_angle is not None:
-            sharp = math.cos(math.radians(options.feature_angle))
-        if sharp > -1.0 or len(surface.loop_size):
-            kernels.quadrics.add_creases(
-                surface, quadrics.terms, BOUNDARY_WEIGHT, FEATURE_WEIGHT, sharp
-            )
-        return quadrics
 
     def _new_watch(self) -> Watch | None:
         """Boxes around the faces as they are, for the guard against self-intersections."""
@@ -163,111 +151,7 @@ class Engine:
         watch: Watch = kernels.intersections.watch_over(self._surface.vertices, faces)
         return watch
 
-    def run(self, progress: Progress | None = None) -> None:
-        """Sweep until a criterion is reached, or no edge is left that the rules let go."""
-        if self._cost is None:
-            self._run_below_length(progress)
-        else:
-            self._run_by_cost(progress)
-        if progress is not None:
-            progress("contract", 1.0)
-
-    def _run_below_length(self, progress: Progress | None) -> None:
-        """Contract every edge below one length."""
-        retry = False
-        while True:
-            n_contracted = self.sweep(retry, progress)
-            if n_contracted == 0 and retry:
-                return
-            retry = n_contracted * FULL_SWEEP <= self.n_faces
-            self._compact_when_half()
-
-    def _run_by_cost(self, progress: Progress | None) -> None:
-        """Contract the cheapest edges first: sweeps with a threshold that grows."""
-        state = kernels.state
-        n_given, threshold, n_barren, retry = self.n_faces, self._smallest_threshold(), 0, False
-        self.rank()
-        while not self.has_enough:
-            threshold = self.next_threshold(threshold, n_barren)
-            n_contracted = self.sweep_ranked(threshold)
-            n_barren = 0 if n_contracted else n_barren + 1
-            if progress is not None:
-                n_most = max(1, n_given - self.rules.min_faces)
-                progress("contract", (n_given - self.n_faces) / n_most)
-            if threshold == np.inf:
-                if retry and n_barren:
-                    return
-                states = self._surface.face_state
-                states[states == state.RANKED] = state.STALE_ODD  # ask all edges again
-                retry = True
-            self._compact_when_half()
-            self.rank()
-
-    @property
-    def has_enough(self) -> bool:
-        """Whether one more contraction would leave fewer faces than are asked for."""
-        return self.rules.min_faces > 0 and self.n_faces - 2 < self.rules.min_faces
-
-    def rank(self) -> None:
-        """Bring the costs of the edges up to date."""
-        n_faces = len(self._face_origin)
-        kernels.cost.rank(self._surface, self._quadrics, self.rules, self._cost, 0, n_faces)
-
-    def _smallest_threshold(self) -> float:
-        """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
-        vertices = self._surface.vertices
-        nothing2 = (
-            NOTHING**2 * float((np.ptp(vertices, axis=0) ** 2).sum()) if self.n_faces else 0.0
-        )
-        if self._quadrics is None or self.rules.by_length:
-            return nothing2
-        mean_area = float(self._quadrics.normals[:, 3].sum()) / (3 * max(1, self.n_faces))
-        return nothing2 * mean_area
-
-    def next_threshold(self, threshold: float, n_barren: int = 0) -> float:
-        """A cost that some share of the edges are below, and no more than have to go.
-
-        Parameters
-        ----------
-        threshold : float
-            The one of the sweep before, which is not gone below.
-        n_barren : int
-            The number of sweeps before that have contracted nothing.
-        """
-        state = kernels.state
-        step = max(1, len(self._face_origin) // SAMPLE)
-        is_ranked = self._surface.face_state[::step] == state.RANKED
-        costs = self._costs.reshape(-1, 3)[::step][is_ranked]
-        costs = np.sort(costs[costs < np.inf])
-        min_faces = self.rules.min_faces
-        share = SHARES[0] if self.n_faces > 2 * min_faces else SHARES[1]
-        if min_faces:
-            share = min(share, (self.n_faces - min_faces) / (3 * self.n_faces))
-        share = max(share, 1.0 / max(1, len(costs))) * 2.0**n_barren
-        if not len(costs) or share > 1.0:
-            return np.inf
-        cheap = costs[min(int(share * len(costs)), len(costs) - 1)]
-        return max(threshold, float(np.nextafter(cheap, np.float32(np.inf))))
-
-    @property
-    def _costs(self) -> NDArray[np.float32]:
-        assert self._cost is not None
-        return self._cost
-
-    def sweep_ranked(self, threshold: float) -> int:
-        """Sweep once over all faces and contract edges that cost less than a threshold.
-
-        Returns the number of contractions.
-        """
-        state = kernels.state
-        rules = self.rules._replace(max_cost=threshold)
-        n_contracted = kernels.sweep.sweep_ranked(
-            *(self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost),
-            *(0, len(self._face_origin), state.STALE_ODD),
-        )
-        n_contracted += self._unblock_deferred(rules, state.STALE_ODD)
-        self.n_sweeps += 1
-        return int(n_contracted)
+    # --- below one length -------------------------------------------------------------------------
 
     def sweep(self, retry: bool = True, progress: Progress | None = None) -> int:
         """Sweep once over all faces; return the number of contractions.
@@ -278,59 +162,225 @@ class Engine:
             Try faces again all of whose short edges were refused before.
         progress : callable, optional
         """
-        state = kernels.state
-        colour = state.STALE_EVEN if self.n_sweeps % 2 == 0 else state.STALE_ODD
         n_faces = len(self._face_origin)
+        parts = blocks.parts(n_faces, FACES_AT_ONCE)
+        self._let_all_be_looked_at()
         n_contracted = 0
-        for first in range(0, n_faces, FACES_AT_ONCE):
-            last = min(first + FACES_AT_ONCE, n_faces)
-            n_contracted += kernels.sweep.sweep(
-                self._surface,
-                self._quadrics,
-                self._watch,
-                self._scratch,
-                self.rules,
-                first,
-                last,
-                colour,
-                retry,
-            )
+        for i in range(len(parts)):
+            n_contracted += self._sweep(self._surface, self._scratch, parts[i : i + 1], 1, retry)
             if progress is not None:  # every sweep is half of what is still to do
-                progress("contract", 1.0 - 0.5**self.n_sweeps * (1.0 - 0.5 * last / n_faces))
-        n_contracted += self._unblock_deferred(self.rules, colour)
+                share = 1.0 - 0.5 * parts[i, 1] / max(1, n_faces)
+                progress("contract", 1.0 - 0.5**self.n_sweeps * share)
         self.n_sweeps += 1
+        return n_contracted + self._unblock_deferred()
+
+    def sweep_divided(self, progress: Progress | None = None) -> int:
+        """Sweep over blocks until little is left in them; return the number of contractions."""
+        all_blocks = self._divide()
+        self._let_all_be_looked_at()
+
+        def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
+            return self._sweep(surface, scratch, some, MOST_SWEEPS, False)
+
+        begin = 1.0 - 0.5**self.n_sweeps
+        n_contracted = self._share(task, all_blocks, progress, (begin, 0.5 * (1.0 + begin)))
+        self.n_sweeps += 1
+        return n_contracted + self._unblock_deferred()
+
+    def _sweep(
+        self, surface: Surface, scratch: Scratch, some: blocks.Blocks, n_sweeps: int, retry: bool
+    ) -> int:
+        bundles = surface, self._quadrics, self._watch, scratch, self.rules
+        colour = kernels.state.STALE_EVEN
+        return int(kernels.sweep.sweep(*bundles, self._listed, some, n_sweeps, colour, retry))
+
+    def _let_all_be_looked_at(self) -> None:
+        """Give all faces that wait for a sweep the colour that the next one does not have."""
+        state = kernels.state
+        self._surface.face_state[self._surface.face_state == state.STALE_EVEN] = state.STALE_ODD
+
+    # --- by cost ----------------------------------------------------------------------------------
+
+    def rank(self) -> None:
+        """Bring the costs of the edges up to date."""
+
+        def task(part: slice) -> None:
+            bundles = self._surface, self._quadrics, self.rules, self._cost
+            kernels.cost.rank(*bundles, self._listed, part.start, part.stop)
+
+        Crew(self._threads).share(task, len(self._face_origin), blocks.FACES * blocks.AT_ONCE)
+
+    def sweep_ranked(
+        self, thresholds: NDArray[np.float64], progress: Progress | None = None, done: float = 0.0
+    ) -> int:
+        """Sweep with each threshold in turn, and contract edges that cost less.
+
+        Parameters
+        ----------
+        thresholds : ndarray, shape (k,), float64
+            Ascending.
+        progress : callable, optional
+        done : float
+            What to tell it.
+
+        Returns
+        -------
+        int
+            Number of contractions.
+        """
+        n_faces = len(self._face_origin)
+
+        def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
+            bundles = surface, self._quadrics, self._watch, scratch, self.rules
+            lists = self._cost, thresholds, self._listed
+            return int(kernels.sweep.sweep_ranked(*bundles, *lists, some))
+
+        if self.is_divided:
+            all_blocks = self._divide()
+            n_cheaper = kernels.cost.count_cheaper(
+                self._cost, self._listed, all_blocks, thresholds[-1]
+            )
+            blocks.allot(all_blocks, self._n_spare, n_cheaper)
+            n_contracted = self._share(task, all_blocks, progress, (done, done))
+        else:
+            n_contracted = task(self._surface, self._scratch, blocks.whole(n_faces, self._n_spare))
+            if progress is not None:
+                progress("contract", done)
+        self._scratch.point[kernels.state.MAX_COST] = thresholds[-1]
+        self.n_sweeps += 1
+        return n_contracted + self._unblock_deferred()
+
+    def negligible_cost(self) -> float:
+        """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
+        vertices = self._surface.vertices
+        nothing2 = (
+            NOTHING**2 * float((np.ptp(vertices, axis=0) ** 2).sum()) if self.n_faces else 0.0
+        )
+        if self._quadrics is None or self.rules.by_length:
+            return nothing2
+        areas = self._quadrics[:, kernels.quadrics.AREA]  # every one three times
+        return nothing2 * float(areas.sum()) / (3 * max(1, self.n_faces))
+
+    def sample_of_costs(self) -> NDArray[np.float32]:
+        """Costs of some of the edges that may be contracted, ascending."""
+        assert self._cost is not None
+        step = max(1, len(self._face_origin) // SAMPLE)
+        is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
+        costs = self._cost.reshape(-1, 3)[::step][is_ranked]
+        return np.sort(costs[costs < np.inf])
+
+    def forget_refusals(self) -> None:
+        """Let all edges be ranked and tried again."""
+        state = kernels.state
+        self._surface.face_state[self._surface.face_state == state.RANKED] = state.STALE_ODD
+
+    # --- threads ----------------------------------------------------------------------------------
+
+    def _divide(self) -> blocks.Blocks:
+        """Divide the live faces, in the one way and in the other in turn."""
+        assert self._cells is not None
+        surface, way = self._surface, self.n_sweeps % 2
+        all_blocks = blocks.divide(
+            self._cells, way, surface.corner_vertex, surface.face_block, self._listed
+        )
+        if self.topology_before.n_boundary_loops:
+            kernels.loops.find_loop_homes(surface)
+        return all_blocks
+
+    def _unite(self) -> None:
+        """Make one block of all faces again."""
+        surface = self._surface
+        surface.face_block[:] = 0
+        self._listed = np.arange(len(self._face_origin), dtype=np.int32)
+        if self.topology_before.n_boundary_loops:
+            surface.loop_home[:] = 0
+            kernels.loops.count_loop_edges(surface.loop, surface.merged_into, surface.loop_size)
+
+    def _share(
+        self,
+        task: Callable[[Surface, Scratch, blocks.Blocks], int],
+        all_blocks: blocks.Blocks,
+        progress: Progress | None,
+        span: tuple[float, float],
+    ) -> int:
+        """Do a task for blocks, some at once, each time with a tally and a log of its own.
+
+        Returns the number of contractions.
+        """
+        state, surface, scratch = kernels.state, self._surface, self._scratch
+
+        def do(part: slice) -> _Done:
+            own, some = self._borrow_scratch(), all_blocks[part]
+            own.tally[: state.N_DONE] = own.tally[state.N_DEFERRED] = 0
+            merges = np.empty((int((some[:, 1] - some[:, 0]).sum()), 2))
+            n_contracted = task(surface._replace(merges=merges), own, some)
+            deferred = own.lists[state.DEFERRED, : own.tally[state.N_DEFERRED]].copy()
+            done = _Done(own.tally[: state.N_DONE].copy(), merges[:n_contracted].copy(), deferred)
+            self._idle.put(own)
+            return done
+
+        def tell(name: str, done: float) -> None:
+            assert progress is not None
+            progress("contract", span[0] + (span[1] - span[0]) * done)
+
+        crew = Crew(self._threads, None if progress is None else tell)
+        n_contracted = 0
+        for done in crew.share(do, len(all_blocks), blocks.AT_ONCE):
+            n_before = self.tally("N_SIMPLE") + self.tally("N_NESTED")
+            n_contracted += len(done.merges)
+            surface.merges[n_before : n_before + len(done.merges)] = done.merges
+            scratch.tally[: state.N_DONE] += done.tally
+            n_deferred = self.tally("N_DEFERRED")
+            scratch.lists[state.DEFERRED, n_deferred : n_deferred + len(done.deferred)] = (
+                done.deferred
+            )
+            scratch.tally[state.N_DEFERRED] += len(done.deferred)
+        self._unite()
         return n_contracted
+
+    def _borrow_scratch(self) -> Scratch:
+        """Scratch space for the thread that asks."""
+        try:
+            return self._idle.get_nowait()
+        except Empty:
+            return start_scratch(len(self._listed), len(self._scratch.mark), 0)
 
     def mesh(self) -> Mesh:
         """The live faces, with all vertices under their old numbers."""
         corner_vertex = self._surface.corner_vertex.reshape(-1, 3)
         live = corner_vertex[:, 0] != kernels.corners.DEAD
-        return Mesh(self._surface.vertices.copy(), corner_vertex[live])
+        arranged = self._arranged
+        faces = arranged.vertex_origin[corner_vertex[live]]
+        return Mesh(self._surface.vertices[arranged.vertex_place], faces)
 
     def vertex_weights(self) -> VertexWeights:
         """How the merged vertices are made of those given."""
         n = self.tally("N_SIMPLE") + self.tally("N_NESTED")
-        surface = self._surface
-        return VertexWeights(surface.merged_into.copy(), surface.merges[:n].copy())
+        origin, place = self._arranged.vertex_origin, self._arranged.vertex_place
+        merged_into = np.append(origin, np.int32(-1))[self._surface.merged_into[place]]
+        merges = self._surface.merges[:n].copy()
+        merges[:, 0] = origin[merges[:, 0].astype(np.int64)]
+        return VertexWeights(merged_into, merges)
 
     @cached_property
     def result(self) -> Result:
-        """The live part, renumbered, and what is left in it. Ends the run."""
+        """The live part, renumbered in the order given, and what is left in it. Ends the run."""
         edges, reasons = self._remaining_edges()
         self._compact()
-        surface = self._surface
+        surface, place = self._surface, self._arranged.vertex_place
+        order = np.argsort(self._face_origin)
+        faces = surface.corner_vertex.reshape(-1, 3)[order]
         number = np.empty(len(surface.merged_into), np.int32)
         merged_into = surface.merged_into.copy()  # whose paths are shortened
-        n_used = kernels.result.number_vertices(surface.corner_vertex, merged_into, number)
+        n_used = kernels.result.number_vertices(surface.corner_vertex, place, merged_into, number)
         vertices = np.empty((n_used, 3))
         kernels.result.copy_vertices(
-            surface.vertices, number, merged_into, surface.corner_vertex, vertices
+            surface.vertices, number, merged_into, faces.reshape(-1), vertices
         )
-        faces = surface.corner_vertex.reshape(-1, 3)
-        shortest, longest = kernels.result.edge_extremes(vertices, surface.corner_vertex)
+        shortest, longest = kernels.result.edge_extremes(vertices, faces.reshape(-1))
         stop = self._stop(reasons, longest)
         return Result(
-            *(vertices, faces, number, self._face_origin, number[edges], reasons),
+            *(vertices, faces, number[place], self._face_origin[order], number[edges], reasons),
             *(shortest, stop, self._vertex_errors(number)),
         )
 
@@ -338,8 +388,9 @@ class Engine:
         """The quadric errors of the vertices that are left, as distances."""
         if self._quadrics is None:
             return np.empty(0)
-        is_left = (self._surface.merged_into == np.arange(len(number))) & (number >= 0)
-        terms = self._quadrics.terms[is_left]
+        place, is_used = self._arranged.vertex_place, number >= 0
+        is_left = (self._surface.merged_into == np.arange(len(number))) & is_used
+        terms = self._quadrics[place[is_left[place]]]
         weight = terms[:, 0] + terms[:, 3] + terms[:, 5]
         errors: NDArray[np.float64] = np.sqrt(terms[:, 9] / np.where(weight > 0.0, weight, 1.0))
         return errors
@@ -348,7 +399,7 @@ class Engine:
         """The criterion that ended the run; "exhausted" when all that is left is forbidden."""
         options, state = self.options, kernels.state
         if self.has_enough:
-            return "target_faces" if options.target_faces == self.rules.min_faces else "keep_ratio"
+            return "target_faces" if options.target_faces == self.min_faces else "keep_ratio"
         is_open = np.repeat(self._surface.face_state != state.SETTLED, 3)
         is_held = is_open & (self._surface.verdict == state.ERROR_BOUND)
         if "error_bound" in reasons or (options.max_edge_length is None and is_held.any()):
@@ -391,21 +442,25 @@ class Engine:
         rules = self.rules._replace(
             removal_limit2=np.inf, max_steps=self.tally("N_STEPS") + most_steps
         )
-        self._unblock(rules, state.SETTLED, commit=False)
+        self._unblock(rules, commit=False)
 
-    def _unblock_deferred(self, rules: Rules, colour: int) -> int:
+    def _unblock_deferred(self) -> int:
         """Contract blocked edges, where they are to be contracted at all."""
         n_contracted = 0
-        if rules.blocked == kernels.state.CONTRACT and self.tally("N_DEFERRED"):
-            n_contracted = self._unblock(rules, colour, commit=True)
+        if self.rules.blocked == kernels.state.CONTRACT and self.tally("N_DEFERRED"):
+            n_contracted = self._unblock(self.rules, commit=True)
         self._scratch.tally[kernels.state.N_DEFERRED] = 0
         return n_contracted
 
-    def _unblock(self, rules: Rules, colour: int, *, commit: bool) -> int:
+    def _unblock(self, rules: Rules, *, commit: bool) -> int:
+        state = kernels.state
         bundles = self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost
-        return int(kernels.sweep.unblock(*bundles, self._outer, colour, commit))
+        whole = blocks.whole(len(self._face_origin), self._n_spare)
+        colour = state.STALE_ODD if self._cost is None else state.MOVED
+        return int(kernels.sweep.unblock(*bundles, self._outer, whole, colour, commit))
 
-    def _compact_when_half(self) -> None:
+    def compact_when_half(self) -> None:
+        """Drop the dead faces when they are more than the live ones."""
         if 2 * self.n_faces < len(self._face_origin):
             self._compact()
             self._watch = self._new_watch()
@@ -425,36 +480,15 @@ class Engine:
             *(corner_vertex, face_state, verdict, origin),
         )
         next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
+        if self._cells is not None:
+            self._cells = blocks.copy_live(self._cells, surface.corner_vertex, self.n_faces)
         self._face_origin = origin
+        self._listed = np.arange(self.n_faces, dtype=np.int32)
         self._surface = surface._replace(
             corner_vertex=corner_vertex,
             next_corner=next_corner,
             face_state=face_state,
+            face_block=np.zeros(self.n_faces, np.int32),
             verdict=verdict,
         )
         self._scratch.face_mark.fill(0)
-
-
-def _scratch(n_faces: int, n_coned: int) -> Scratch:
-    """Scratch space for so many faces, and real and virtual vertices."""
-    state = kernels.state
-    scratch: Scratch = state.Scratch(
-        tally=np.zeros(state.TALLY_SIZE, np.int64),
-        mark=np.zeros(n_coned, np.int32),
-        face_mark=np.zeros(n_faces, np.int32),
-        nodes=np.zeros((3, n_coned), np.int32),
-        lists=np.empty((state.N_LISTS, n_faces + 2), np.int32),
-        point=np.zeros(8),
-    )
-    scratch.tally[state.N_LIVE] = n_faces
-    scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
-    return scratch
-
-
-def _refuse(report: TopologyReport) -> None:
-    """Raise when a mesh is no consistently oriented 2-manifold."""
-    defects = report.defects()
-    if defects is not None:
-        raise MeshError(
-            f"the mesh is no consistently oriented 2-manifold: {defects}; repair=True repairs it"
-        )

@@ -155,8 +155,8 @@ class Options:
             wanted.append(math.ceil(self.keep_ratio * n_faces))
         return max(wanted)
 
-    def rules(self, n_faces: int) -> Rules:
-        """The options as the kernels want them, for a mesh of so many faces."""
+    def rules(self) -> Rules:
+        """The options as the kernels want them."""
         length = math.inf if self.max_edge_length is None else float(self.max_edge_length)
         limit, in_edges = self.removal_limit, 0.0
         if limit is None:
@@ -166,9 +166,7 @@ class Options:
         placement = PLACEMENTS[self.chosen_placement]
         return kernels.state.Rules(
             max_length2=length**2,
-            max_cost=length**2,
             by_length=self.by_length,
-            min_faces=self.fewest_faces(n_faces),
             blocked=BLOCKED.index(self.blocked),
             removal_limit2=float(limit) ** 2,
             removal_edges2=in_edges**2,

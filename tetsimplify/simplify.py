@@ -17,6 +17,7 @@ from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.repair import repair as repair_mesh
 from tetsimplify.report import Simplification, SimplificationReport
+from tetsimplify.schedule import run
 from tetsimplify.topology import topology
 from tetsimplify.within import run_within
 
@@ -45,6 +46,7 @@ def simplify(
     repair: bool = False,
     vertex_data: Mapping[str, ArrayLike] | None = None,
     face_data: Mapping[str, ArrayLike] | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Simplification:
     """Contract edges without changing the topology.
@@ -127,6 +129,8 @@ def simplify(
         (at the foot of the new vertex on the edge, so that linear functions of the position stay
         exact where the new vertex is on the edge); all other types are labels, taken from the
         nearer end of the edge and never averaged.
+    threads : int, optional
+        None for as many as the process may use. The result does not depend on it.
     progress : callable, optional
         Called as ``progress(stage, done)`` with `done` from 0 to 1. Raise from it to cancel.
 
@@ -204,6 +208,7 @@ def simplify(
             repair=repair,
             vertex_data=vertex_data,
             face_data=face_data,
+            threads=threads,
             progress=progress,
             **given_options,
         )
@@ -219,15 +224,15 @@ def simplify(
             held = held[repaired.vertex_origin]
             of_vertices = {k: data[repaired.vertex_origin] for k, data in of_vertices.items()}
             given = Mesh(repaired.vertices, repaired.faces)
-        engine = Engine(given, options, held)
+        engine = Engine(given, options, held, threads=threads)
         shortest_before, _ = kernels.result.edge_extremes(given.vertices, given.faces.reshape(-1))
 
     with clock.stage("contract"):
         n_rounds = 1
         if options.max_error is None:
-            engine.run(progress)
+            run(engine, progress)
         else:
-            engine, n_rounds = run_within(given, options, held, progress)
+            engine, n_rounds = run_within(given, options, held, threads, progress)
 
     with clock.stage("report"):
         weights = engine.vertex_weights() if of_vertices else None

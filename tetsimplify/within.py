@@ -22,6 +22,7 @@ from tetsimplify.engine import Engine, Result
 from tetsimplify.errors import OptionError
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
+from tetsimplify.schedule import run
 from tetsimplify.targets import Target
 
 FIRST_BOUND = 0.6  # of the limit: the quadric error that is allowed in the first round
@@ -33,7 +34,11 @@ LAST_BOUND = -1.0  # less than any error
 
 
 def run_within(
-    given: Mesh, options: Options, locked: NDArray[np.bool_], progress: Progress | None
+    given: Mesh,
+    options: Options,
+    locked: NDArray[np.bool_],
+    threads: int | None,
+    progress: Progress | None,
 ) -> tuple[Engine, int]:
     """Contract edges so that both surfaces stay within ``options.max_error`` of each other.
 
@@ -56,8 +61,8 @@ def run_within(
         raise OptionError(f"max_error must be at least {least:g} of the diagonal, got {limit:g}")
     n_rounds = 0
     while True:
-        engine = Engine(given, options, locked, bound)
-        engine.run(progress)
+        engine = Engine(given, options, locked, bound, threads)
+        run(engine, progress)
         n_rounds += 1
         if before is None:
             return engine, n_rounds

@@ -11,8 +11,9 @@ from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition
 from tetsimplify.kernels.placement import find_place
-from tetsimplify.kernels.quadrics import error_bound, increase, merge_quadrics, weight
+from tetsimplify.kernels.quadrics import MAX_ERROR2, error_bound, increase, merge_quadrics, weight
 from tetsimplify.kernels.state import (
+    BLOCK,
     CONTRACTIBLE,
     COST,
     DOOMED,
@@ -23,14 +24,19 @@ from tetsimplify.kernels.state import (
     FOLLOWER,
     INTERSECTION,
     LOCKED,
+    MAX_COST,
+    MOVED,
     N_LENS_FACES,
     N_LENS_VERTICES,
     N_LENSES,
     N_LIVE,
     N_NESTED,
     N_SIMPLE,
+    N_SPARE,
     PLACE,
+    RANKED,
     SETTLED,
+    STALE_ODD,
     STAR_U,
     STAR_V,
     TOO_DEAR,
@@ -51,12 +57,11 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
         return LOCKED
     n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)
     if rules.blocked != VIOLATE:
-        allowed = link_condition(
-            surface.loop, surface.loop_size, v, u, n_v, n_u, n_doomed, n_common
-        )
+        block = scratch.tally[BLOCK]
+        allowed = link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common)
         if allowed != CONTRACTIBLE:
             return allowed
-    if scratch.tally[N_LIVE] - n_doomed < rules.min_faces:
+    if n_doomed > scratch.tally[N_SPARE]:
         return ENOUGH
     placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
     if placed == CONTRACTIBLE and quadrics is not None:
@@ -67,7 +72,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     if placed != CONTRACTIBLE:
         return placed
     loop = max(surface.loop[v], surface.loop[u])
-    if n_doomed == 1 and loop >= 0:
+    if n_doomed == 1 and loop >= 0 and surface.loop_home[loop] == scratch.tally[BLOCK]:
         surface.loop_size[loop] -= 1
     _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
     if watch is not None:
@@ -90,7 +95,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
     if lens.outcome != CONTRACTIBLE:
         return lens.outcome
     placed = find_place(surface, quadrics, scratch, rules, v, u, lens.n_v, lens.n_u)
-    if placed == CONTRACTIBLE and scratch.tally[N_LIVE] - lens.n_doomed < rules.min_faces:
+    if placed == CONTRACTIBLE and lens.n_doomed > scratch.tally[N_SPARE]:
         placed = ENOUGH
     if placed == CONTRACTIBLE and quadrics is not None:
         _add_removed(surface, quadrics, scratch, lens.first_removed)
@@ -121,13 +126,12 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
 @part
 def _judge(quadrics, scratch, rules, v, u):
     """Whether the place found, which need not be the best one, is within the bounds."""
-    error, terms = scratch.point[ERROR], quadrics.terms
+    error, terms = scratch.point[ERROR], quadrics
     if error > (weight(terms, v) + weight(terms, u)) * error_bound(quadrics, v, u):
         return ERROR_BOUND
     scratch.point[COST] = increase(terms, v, u, error) * scratch.point[FACTOR]
-    return (
-        TOO_DEAR if scratch.point[COST] > rules.max_cost and not rules.by_length else CONTRACTIBLE
-    )
+    is_dear = scratch.point[COST] > scratch.point[MAX_COST] and not rules.by_length
+    return TOO_DEAR if is_dear else CONTRACTIBLE
 
 
 @part
@@ -137,12 +141,12 @@ def _add_removed(surface, quadrics, scratch, vertex):
     Every vertex counts with the weight of its planes and its whole distance to the new vertex,
     which is more than the distance of the planes.
     """
-    terms, vertices, point = quadrics.terms, surface.vertices, scratch.point
+    terms, vertices, point = quadrics, surface.vertices, scratch.point
     while vertex >= 0:
         distance2 = 0.0
         for axis in range(3):
             distance2 += (vertices[vertex, axis] - point[axis]) ** 2
-        if distance2 > quadrics.max_error2[vertex]:
+        if distance2 > quadrics[vertex, MAX_ERROR2]:
             point[ERROR] = np.inf
         point[ERROR] += distance2 * weight(terms, vertex)
         vertex = scratch.nodes[FOLLOWER, vertex]
@@ -158,6 +162,7 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
         for k in range(3):
             corner_vertex[3 * f + k] = DEAD
     scratch.tally[N_LIVE] -= n_doomed
+    scratch.tally[N_SPARE] -= n_doomed
 
     if quadrics is not None:
         merge_quadrics(surface, quadrics, scratch, v, u)
@@ -178,4 +183,13 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
     n = n_v + n_u
     for i in range(n):
         surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
-        surface.face_state[star[i] // 3] = colour
+        surface.face_state[star[i] // 3] = _touched(surface.face_state, star[i], colour)
+
+
+@part
+def _touched(face_state, corner, colour):
+    """The state of a face the vertex of whose corner has moved."""
+    if colour < MOVED:
+        return colour
+    state, moved = face_state[corner // 3], MOVED + corner % 3
+    return moved if state == RANKED or state == moved else STALE_ODD

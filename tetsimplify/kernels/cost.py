@@ -4,13 +4,14 @@ import numpy as np
 
 from tetsimplify.kernels.corners import ahead
 from tetsimplify.kernels.geometry import squared_length
-from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.jit import cold_part, kernel, kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.quadrics import error_bound, increase, sum_at, weight
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
     ERROR_BOUND,
     LOCKED,
+    MOVED,
     RANKED,
     SETTLED,
 )
@@ -53,7 +54,7 @@ def _ranked_cost(surface, quadrics, rules, a, b):
         return np.inf, LOCKED
     if quadrics is None:
         return length2, CONTRACTIBLE
-    terms = quadrics.terms
+    terms = quadrics
     x, y, z = (
         vertices[b, 0] - vertices[a, 0],
         vertices[b, 1] - vertices[a, 1],
@@ -66,19 +67,24 @@ def _ranked_cost(surface, quadrics, rules, a, b):
     return length2 if rules.by_length else increase(terms, a, b, error), CONTRACTIBLE
 
 
-@kernel_in_place
-def rank(surface, quadrics, rules, cost, first, last):
-    """Bring the costs of the faces from `first` to `last` up to date.
+@cold_part
+def rank_faces(surface, quadrics, rules, cost, listed, first, last):
+    """Bring the costs of the faces listed from `first` to `last` up to date.
 
     Every edge is looked at from one face only, where it begins at its lower vertex. Its other
     corner has an infinite cost.
     """
-    for f in range(first, last):
+    for i in range(first, last):
+        f = listed[i]
         state = surface.face_state[f]
         if state == RANKED or state == SETTLED:
             continue
         surface.face_state[f] = RANKED
-        for corner in range(3 * f, 3 * f + 3):
+        opposite = (state - MOVED + 1) % 3 if state >= MOVED else -1  # which has not changed
+        for k in range(3):
+            if k == opposite:
+                continue
+            corner = 3 * f + k
             a = surface.corner_vertex[corner]
             b = surface.corner_vertex[ahead(corner)]
             price, verdict = np.inf, CONTRACTIBLE
@@ -86,6 +92,23 @@ def rank(surface, quadrics, rules, cost, first, last):
                 price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
             cost[corner] = price
             surface.verdict[corner] = verdict
+
+
+@kernel_in_place
+def rank(surface, quadrics, rules, cost, listed, first, last):
+    """:func:`rank_faces`, for Python."""
+    rank_faces(surface, quadrics, rules, cost, listed, first, last)
+
+
+@kernel
+def count_cheaper(cost, listed, blocks, threshold):
+    """How many edges of each block cost less than a threshold."""
+    n_cheaper = np.zeros(len(blocks), np.int64)
+    for b in range(len(blocks)):
+        for i in range(blocks[b, 0], blocks[b, 1]):
+            for corner in range(3 * listed[i], 3 * listed[i] + 3):
+                n_cheaper[b] += cost[corner] < threshold
+    return n_cheaper
 
 
 @part

@@ -4,6 +4,7 @@ import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind
 from tetsimplify.kernels.jit import part
+from tetsimplify.kernels.quadrics import AREA, NORMAL
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
     FACTOR,
@@ -66,10 +67,11 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
         CONTRACTIBLE, or the guard that forbids it.
     """
     vertices, corner_vertex, point = surface.vertices, surface.corner_vertex, scratch.point
-    normals = quadrics.normals
     px, py, pz = point[0], point[1], point[2]
-    sum_x, sum_y = normals[v, 0] + normals[u, 0], normals[v, 1] + normals[u, 1]
-    sum_z, sum_area = normals[v, 2] + normals[u, 2], normals[v, 3] + normals[u, 3]
+    sum_x = quadrics[v, NORMAL] + quadrics[u, NORMAL]
+    sum_y = quadrics[v, NORMAL + 1] + quadrics[u, NORMAL + 1]
+    sum_z = quadrics[v, NORMAL + 2] + quadrics[u, NORMAL + 2]
+    sum_area = quadrics[v, AREA] + quadrics[u, AREA]
     foldover = rules.cos_foldover * abs(rules.cos_foldover)
     deviation = rules.cos_deviation * abs(rules.cos_deviation)
     worst_old = worst_new = 1.0  # squares of the shapes
@@ -97,11 +99,11 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
                 if old2 > FLAT * FLAT * old_sum * old_sum:
                     return FOLDOVER
             if rules.cos_deviation > NO_GUARD:
-                rx = sum_x + normals[a, 0] + normals[b, 0]
-                ry = sum_y + normals[a, 1] + normals[b, 1]
-                rz = sum_z + normals[a, 2] + normals[b, 2]
+                rx = sum_x + quadrics[a, NORMAL] + quadrics[b, NORMAL]
+                ry = sum_y + quadrics[a, NORMAL + 1] + quadrics[b, NORMAL + 1]
+                rz = sum_z + quadrics[a, NORMAL + 2] + quadrics[b, NORMAL + 2]
                 r2 = rx * rx + ry * ry + rz * rz
-                cancelled = UNDECIDED * (sum_area + normals[a, 3] + normals[b, 3])
+                cancelled = UNDECIDED * (sum_area + quadrics[a, AREA] + quadrics[b, AREA])
                 dot = rx * new_x + ry * new_y + rz * new_z
                 if dot * abs(dot) < deviation * r2 * new2 and r2 > cancelled * cancelled:
                     return NORMAL_DEVIATION

@@ -74,5 +74,17 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
     except RuntimeError as error:  # no folder that the cache could be written to
         warnings.warn(f"kernels are compiled anew in every process: {error}", stacklevel=3)
         return numba.njit(nogil=True, **options)(function)
-    compiled._cache._cache_file._source_stamp = KERNELS_DIGEST
+    _name_by_digest(compiled._cache._cache_file)
     return compiled
+
+
+def _name_by_digest(cache: Any) -> None:
+    """Give the files of each state of the kernels names of their own.
+
+    Those of another state could not even be read where a NamedTuple has changed.
+    """
+    name = f"{cache._index_name.removesuffix('.nbi')}.{KERNELS_DIGEST[:16]}"
+    cache._source_stamp = KERNELS_DIGEST
+    cache._index_name = f"{name}.nbi"
+    cache._index_path = str(Path(cache._cache_path) / cache._index_name)
+    cache._data_name_pattern = f"{name}.{{number:d}}.nbc"

@@ -11,13 +11,16 @@ tetrahedron, or with the cone in a single triangle):
               b
 """
 
+from tetsimplify.kernels.blocks import GONE
 from tetsimplify.kernels.corners import DEAD, ahead, behind
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.state import (
+    BLOCK,
     CONTRACTIBLE,
     DOOMED,
     NESTED,
     OBSTRUCTED,
+    OUTSIDE,
     STAMP,
     STAR_U,
     STAR_V,
@@ -36,7 +39,7 @@ def gather_stars(surface, scratch, corner):
     n_v, n_u, n_doomed : int
         How many there are of each.
     n_common : int
-        Number of real common neighbours of v and u.
+        Number of real common neighbours of v and u; -1 when a face is outside of the block.
     """
     corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
     star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
@@ -45,11 +48,14 @@ def gather_stars(surface, scratch, corner):
     u = corner_vertex[ahead(corner)]
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
+    face_block, block = surface.face_block, scratch.tally[BLOCK]
 
     n_v = 0
     n_doomed = 0
     c = corner
     while True:
+        if face_block[c // 3] != block and face_block[c // 3] != GONE:
+            return 0, 0, 0, -1
         n = corner_vertex[ahead(c)]
         p = corner_vertex[behind(c)]
         if n != DEAD:
@@ -70,6 +76,8 @@ def gather_stars(surface, scratch, corner):
     start = ahead(corner)
     c = start
     while True:
+        if face_block[c // 3] != block and face_block[c // 3] != GONE:
+            return 0, 0, 0, -1
         n = corner_vertex[ahead(c)]
         p = corner_vertex[behind(c)]
         if n != DEAD:
@@ -89,11 +97,18 @@ def gather_stars(surface, scratch, corner):
 
 
 @part
-def link_condition(loop, loop_size, v, u, n_v, n_u, n_doomed, n_common):
-    """Whether a simple contraction is allowed: CONTRACTIBLE, NESTED or OBSTRUCTED."""
-    loop_v, loop_u = loop[v], loop[u]
+def link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common):
+    """Whether a simple contraction is allowed: CONTRACTIBLE, NESTED, OBSTRUCTED or OUTSIDE.
+
+    A boundary loop has to keep three edges. One that runs through several blocks does: each of
+    the vertices between them stays, and so do the last two edges of a run between two of these.
+    """
+    if n_common < 0:
+        return OUTSIDE
+    loop_v, loop_u = surface.loop[v], surface.loop[u]
     if n_doomed == 1:  # a boundary edge
-        return CONTRACTIBLE if n_common == 1 and loop_size[loop_v] > 3 else NESTED
+        is_long = surface.loop_home[loop_v] != block or surface.loop_size[loop_v] > 3
+        return CONTRACTIBLE if n_common == 1 and is_long else NESTED
     if loop_v >= 0 and loop_u >= 0:  # two loops would be pinched together
         return NESTED if loop_v == loop_u else OBSTRUCTED
     is_tetrahedron = n_v == 1 and n_u == 1 and loop_v < 0 and loop_u < 0

@@ -100,7 +100,7 @@ def least_error(q, x, y, z, fixed, rules):
 def _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
     """The place of least error, or the cheapest of the places of the rules, that harms nothing."""
     vertices, point = surface.vertices, scratch.point
-    q = sum_at(quadrics.terms, vertices, v, u)
+    q = sum_at(quadrics, vertices, v, u)
     ox, oy, oz = vertices[v, 0], vertices[v, 1], vertices[v, 2]
     x, y, z = vertices[u, 0] - ox, vertices[u, 1] - oy, vertices[u, 2] - oz
     fixed = fixed_place(surface, v, u)

@@ -18,7 +18,11 @@ from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
 
-N_TERMS = 10
+# Columns of the row of a vertex, which is as long as two lines of a cache: the upper half of A, b
+# and c; the largest mean squared distance allowed; sums of the original normals, by area, and of
+# the areas.
+CONSTANT, MAX_ERROR2, NORMAL, AREA = 9, 10, 11, 14
+WIDTH = 16
 
 # The optimum is held to the middle of the edge by a spring of this part of the weight: in
 # directions in which the planes do not decide, the middle does. So the solution is always well
@@ -52,8 +56,8 @@ def sum_at(terms, vertices, v, u):
         bx + gx + terms[v, 6],
         by + gy + terms[v, 7],
         bz + gz + terms[v, 8],
-        terms[u, 9] + (gx + 2.0 * bx) * dx + (gy + 2.0 * by) * dy + (gz + 2.0 * bz) * dz
-        + terms[v, 9],
+        terms[u, CONSTANT] + (gx + 2.0 * bx) * dx + (gy + 2.0 * by) * dy + (gz + 2.0 * bz) * dz
+        + terms[v, CONSTANT],
     )  # fmt: skip
 
 
@@ -79,48 +83,51 @@ def weight(terms, v):
 @part
 def increase(terms, v, u, error):
     """How much more the error is than those of v and u alone."""
-    return max(error - terms[v, 9] - terms[u, 9], 0.0)
+    return max(error - terms[v, CONSTANT] - terms[u, CONSTANT], 0.0)
 
 
 @part
 def error_bound(quadrics, v, u):
     """The largest mean squared distance that both v and u allow."""
-    return min(quadrics.max_error2[v], quadrics.max_error2[u])
+    return min(quadrics[v, MAX_ERROR2], quadrics[u, MAX_ERROR2])
 
 
 @part
 def optimum(q, x, y, z):
     """Where q is least, held by a spring at the place given where the planes do not decide.
 
-    Again and again, with the spring at what came out: so what the planes do decide becomes as good
-    as exact, and what they do not decide hardly moves.
+    As if computed again and again, with the spring at what came out: so what the planes do decide
+    becomes as good as exact, and what they do not decide hardly moves. With the spring s and
+    M = s / (A + s), the sum (1 + M + M^2 + ...) of the steps is one polynomial.
     """
     axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
     spring = STABILITY * (axx + ayy + azz)
     if spring <= 0.0:
         return x, y, z
-    # (A + spring I) = L D L', by elimination
-    d1 = axx + spring
-    l21, l31 = axy / d1, axz / d1
-    d2 = ayy + spring - l21 * axy
-    e32 = ayz - l31 * axy
-    l32 = e32 / d2
-    d3 = azz + spring - l31 * axz - l32 * e32
-    for _ in range(REFINEMENTS):
-        gx = axx * x + axy * y + axz * z + bx
-        gy = axy * x + ayy * y + ayz * z + by - l21 * gx
-        gz = axz * x + ayz * y + azz * z + bz - l31 * gx - l32 * gy
-        gz = gz / d3
-        gy = gy / d2 - l32 * gz
-        gx = gx / d1 - l21 * gy - l31 * gz
-        x, y, z = x - gx, y - gy, z - gz
-    return x, y, z
+    sxx, syy, szz = axx + spring, ayy + spring, azz + spring
+    ixx, ixy, ixz = syy * szz - ayz * ayz, axz * ayz - axy * szz, axy * ayz - axz * syy
+    iyy, iyz, izz = sxx * szz - axz * axz, axy * axz - sxx * ayz, sxx * syy - axy * axy
+    scale = 1.0 / (sxx * ixx + axy * ixy + axz * ixz)
+    gx = scale * (axx * x + axy * y + axz * z + bx)
+    gy = scale * (axy * x + ayy * y + ayz * z + by)
+    gz = scale * (axz * x + ayz * y + azz * z + bz)
+    step_x = ixx * gx + ixy * gy + ixz * gz
+    step_y = ixy * gx + iyy * gy + iyz * gz
+    step_z = ixz * gx + iyz * gy + izz * gz
+    dx, dy, dz = step_x, step_y, step_z
+    damping = scale * spring
+    for _ in range(REFINEMENTS - 1):
+        gx, gy, gz = damping * dx, damping * dy, damping * dz
+        dx = step_x + (ixx * gx + ixy * gy + ixz * gz)
+        dy = step_y + (ixy * gx + iyy * gy + iyz * gz)
+        dz = step_z + (ixz * gx + iyz * gy + izz * gz)
+    return x - dx, y - dy, z - dz
 
 
 @part
 def merge_quadrics(surface, quadrics, scratch, v, u):
     """Make of v and u, which are still where they were, what stands for both at the new place."""
-    terms, normals, vertices = quadrics.terms, quadrics.normals, surface.vertices
+    terms, vertices = quadrics, surface.vertices
     q = sum_at(terms, vertices, v, u)
     axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
     x = scratch.point[0] - vertices[v, 0]
@@ -131,10 +138,10 @@ def merge_quadrics(surface, quadrics, scratch, v, u):
     terms[v, 6] = bx + axx * x + axy * y + axz * z
     terms[v, 7] = by + axy * x + ayy * y + ayz * z
     terms[v, 8] = bz + axz * x + ayz * y + azz * z
-    terms[v, 9] = scratch.point[ERROR]
-    for k in range(4):
-        normals[v, k] += normals[u, k]
-    quadrics.max_error2[v] = error_bound(quadrics, v, u)
+    terms[v, CONSTANT] = scratch.point[ERROR]
+    terms[v, MAX_ERROR2] = error_bound(terms, v, u)
+    for k in range(NORMAL, AREA + 1):
+        terms[v, k] += terms[u, k]
 
 
 @part
@@ -158,7 +165,7 @@ def _area_vector(vertices, a, b, c):
 
 
 @kernel_in_place
-def add_faces(vertices, corner_vertex, terms, normals):
+def add_faces(vertices, corner_vertex, terms):
     """Add the plane of each face to the quadrics of its vertices, and its normal to theirs."""
     for f in range(corner_vertex.size // 3):
         a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
@@ -167,10 +174,10 @@ def add_faces(vertices, corner_vertex, terms, normals):
         scale = 1.0 / area if area > 0.0 else 0.0
         for v in (a, b, c):
             _add_plane(terms, v, scale, x, y, z)
-            normals[v, 0] += x
-            normals[v, 1] += y
-            normals[v, 2] += z
-            normals[v, 3] += area
+            terms[v, NORMAL] += x
+            terms[v, NORMAL + 1] += y
+            terms[v, NORMAL + 2] += z
+            terms[v, AREA] += area
 
 
 @kernel_in_place

@@ -4,7 +4,7 @@ import numpy as np
 
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.geometry import squared_length
-from tetsimplify.kernels.jit import kernel, kernel_in_place
+from tetsimplify.kernels.jit import kernel_in_place
 
 
 @kernel_in_place
@@ -23,11 +23,13 @@ def copy_live_faces(corner_vertex, state, verdict, origin, to_corner, to_state, 
 
 
 @kernel_in_place
-def number_vertices(corner_vertex, merged_into, number):
-    """Number the vertices that faces use, in order, and tell every vertex its number.
+def number_vertices(corner_vertex, visit, merged_into, number):
+    """Number the vertices that faces use, and tell every vertex its number.
 
     Parameters
     ----------
+    visit : int32 (n,)
+        The vertices in the order in which they get their numbers.
     merged_into : int32 (n,)
         Vertex that each one was merged into, itself where it was not, -1 where removed.
     number : int32 (n,), out
@@ -43,7 +45,7 @@ def number_vertices(corner_vertex, merged_into, number):
     for corner in range(corner_vertex.size):
         number[corner_vertex[corner]] = 0
     n = 0
-    for v in range(number.size):
+    for v in visit:
         if number[v] == 0:
             number[v] = n
             n += 1
@@ -70,16 +72,6 @@ def copy_vertices(vertices, number, merged_into, corner_vertex, out):
                 out[number[v], axis] = vertices[v, axis]
     for corner in range(corner_vertex.size):
         corner_vertex[corner] = number[corner_vertex[corner]]
-
-
-@kernel
-def count_loop_edges(loop, n_loops):
-    """Number of edges, which is that of vertices, of every boundary loop."""
-    size = np.zeros(max(1, n_loops), np.int32)
-    for v in range(loop.size):
-        if loop[v] >= 0:
-            size[loop[v]] += 1
-    return size
 
 
 @kernel_in_place

@@ -9,13 +9,15 @@ import numpy as np
 
 # States of a face. A sweep passes over settled faces, and over the faces that it has touched
 # itself: these carry its own colour and are its freeze; the next sweep has the other colour.
-# Where costs are kept, faces whose costs are up to date are RANKED, and only these are looked at.
-SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED = 0, 1, 2, 3, 4
+# Where costs are kept, faces whose costs are up to date are RANKED, and only these are looked at;
+# of those with the state MOVED + k, the two edges at the k-th corner are to be ranked anew.
+SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED, MOVED = 0, 1, 2, 3, 4, 5
 
 # What becomes of an edge that is to be contracted. NESTED: the link condition blocks it. ENOUGH:
-# there would be fewer faces than asked for. TOO_DEAR: it costs more than the sweep allows.
+# there would be fewer faces than asked for. TOO_DEAR: it costs more than the sweep allows. OUTSIDE:
+# a face at one of its ends is in another block.
 CONTRACTIBLE, OBSTRUCTED, REMOVAL_LIMIT, LOCKED, NESTED, ENOUGH, TOO_DEAR = 0, 1, 2, 3, 4, 5, 6
-ERROR_BOUND, FOLDOVER, NORMAL_DEVIATION, SHAPE, INTERSECTION = 7, 8, 9, 10, 11
+ERROR_BOUND, FOLDOVER, NORMAL_DEVIATION, SHAPE, INTERSECTION, OUTSIDE = 7, 8, 9, 10, 11, 12
 # What is told of an edge that is left. One that could be contracted is left when there were few
 # enough faces, one that the link condition blocks when those are skipped.
 REASONS = (
@@ -37,29 +39,21 @@ class Surface(NamedTuple):
     corner_vertex: np.ndarray  # int32 (3 m,): vertex of each corner, DEAD of a dead face
     next_corner: np.ndarray  # int32 (3 m,): circular lists of the corners of each vertex
     face_state: np.ndarray  # uint8 (m,)
+    face_block: np.ndarray  # int32 (m,): block of the face, GONE where it was dead before
     verdict: np.ndarray  # uint8 (3 m,): outcome for the edge from each corner, when last tried
     merged_into: np.ndarray  # int32 (n,): vertex that this one was merged into, -1 when removed
     loop: np.ndarray  # int32 (n,): boundary loop of the vertex, -1 inside
     loop_size: np.ndarray  # int32 (n_loops,): edges of each boundary loop
+    loop_home: np.ndarray  # int32 (n_loops,): block that has all its edges, -1 for none
     locked: np.ndarray  # bool (n,): the vertex may neither move nor vanish
     merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
-
-
-class Quadrics(NamedTuple):
-    """What the vertices stand for in quadric modes; see quadrics.py. None in the others."""
-
-    terms: np.ndarray  # float64 (n, 10): quadric of each vertex, relative to it
-    normals: np.ndarray  # float64 (n, 4): sums of the original normals, by area, and of the areas
-    max_error2: np.ndarray  # float64 (n,): largest mean squared distance allowed
 
 
 class Rules(NamedTuple):
     """The policies of a run."""
 
     max_length2: float  # edges shorter than the root of this are contracted
-    max_cost: float  # where costs are kept: edges below this are contracted in this sweep
     by_length: bool  # where costs are kept: they are squared lengths, not quadric errors
-    min_faces: int  # so many faces are left
     blocked: int  # CONTRACT, SKIP or VIOLATE
     removal_limit2: float  # how far from the edge vertices may be removed, squared
     removal_edges2: float  # the same in lengths of the edge; the larger one counts
@@ -87,15 +81,18 @@ class Scratch(NamedTuple):
 
 # Places in `Scratch.tally`: what has been done, and what is at hand.
 N_SIMPLE, N_NESTED, N_LENS_VERTICES, N_LENS_FACES, N_LIVE = 0, 1, 2, 3, 4
+N_DONE = 5  # so many of the counters come first
 STAMP, N_STEPS, N_DEFERRED = 5, 6, 7  # last stamp given, steps of region growing, faces put off
 LENS_STAMP, N_LENSES, CONE = 8, 9, 10  # of the lenses at hand, see lens.py
 STAMP_LIMIT = 11  # stamps are int32; they start anew beyond this
-TALLY_SIZE = 12
+BLOCK, N_SPARE = 12, 13  # the block at hand, see blocks.py; faces that may still go
+TALLY_SIZE = 14
 
 # In `Scratch.point`: parameter of the new vertex along its edge; quadric error at it; factor for
-# the shapes of the triangles there; cost of it all; how far vertices may be removed, squared.
-PLACE, ERROR, FACTOR, COST, REMOVAL2 = 3, 4, 5, 6, 7
-POINT_SIZE = 8
+# the shapes of the triangles there; cost of it all; how far vertices may be removed, squared;
+# where costs are kept, what an edge may cost in this sweep.
+PLACE, ERROR, FACTOR, COST, REMOVAL2, MAX_COST = 3, 4, 5, 6, 7, 8
+POINT_SIZE = 9
 
 # Rows of `Scratch.nodes`.
 SLOT = 0  # sparse set: place of a vertex in some list

@@ -10,27 +10,34 @@ import numpy as np
 
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import cheapest_first, edge_costs
+from tetsimplify.kernels.cost import cheapest_first, edge_costs, rank_faces
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.state import (
+    BLOCK,
     BLOCKED,
     CONTRACTIBLE,
     COST,
     DEFERRED,
     ERROR_BOUND,
+    MAX_COST,
+    MOVED,
     N_DEFERRED,
-    N_LIVE,
+    N_SPARE,
     NESTED,
     OBSTRUCTED,
+    OUTSIDE,
     RANKED,
     REMOVAL_LIMIT,
     SETTLED,
     SKIP,
+    STALE_EVEN,
+    STALE_ODD,
     STAMP,
     STAMP_LIMIT,
     TOO_DEAR,
 )
 
+FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces is the last of its block
 RAISE = 4.0  # so many times the threshold is what a refused edge waits for
 
 
@@ -43,12 +50,35 @@ def _renew_stamps(scratch):
         scratch.face_mark[:] = 0
 
 
+@part
+def _enter(scratch, blocks, block):
+    """Make a row of `blocks` the block at hand; return where its faces are listed."""
+    scratch.tally[N_SPARE] = blocks[block, 2]
+    scratch.tally[BLOCK] = blocks[block, 3]
+    return blocks[block, 0], blocks[block, 1]
+
+
+@part
+def _defer(scratch, f):
+    """Put a face off to `unblock`. Where there is no room a later sweep finds it again."""
+    n = scratch.tally[N_DEFERRED]
+    if n < scratch.lists.shape[1]:
+        scratch.lists[DEFERRED, n] = f
+        scratch.tally[N_DEFERRED] = n + 1
+
+
 @kernel_in_place
-def sweep(surface, quadrics, watch, scratch, rules, first, last, colour, retry):
-    """Contract at most one short edge of each of the faces from `first` to `last`.
+def sweep(surface, quadrics, watch, scratch, rules, listed, blocks, n_sweeps, colour, retry):
+    """Sweep over blocks: contract at most one short edge of each face in each sweep.
 
     Parameters
     ----------
+    listed : int32
+        Faces, in the order in which they are looked at.
+    blocks : int64 (k, 4)
+        See :mod:`tetsimplify.blocks`.
+    n_sweeps : int
+        At most so many over each block, until one contracts next to nothing.
     colour : int
         State that faces get when they are touched; STALE_EVEN and STALE_ODD in turn.
     retry : bool
@@ -62,7 +92,25 @@ def sweep(surface, quadrics, watch, scratch, rules, first, last, colour, retry):
         Number of contractions.
     """
     n_contracted = 0
-    for f in range(first, last):
+    for b in range(len(blocks)):
+        first, last = _enter(scratch, blocks, b)
+        for i in range(n_sweeps):
+            shade = colour if i % 2 == 0 else STALE_EVEN + STALE_ODD - colour
+            n = _sweep_block(
+                surface, quadrics, watch, scratch, rules, listed, first, last, shade, retry
+            )
+            n_contracted += n
+            if n * FULL_SWEEP <= last - first:
+                break
+    return n_contracted
+
+
+@part
+def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, colour, retry):
+    """Sweep once over the faces listed from `first` to `last`."""
+    n_contracted = 0
+    for i in range(first, last):
+        f = listed[i]
         state = surface.face_state[f]
         if state == SETTLED or state == colour or (state == BLOCKED and not retry):
             continue
@@ -74,6 +122,7 @@ def sweep(surface, quadrics, watch, scratch, rules, first, last, colour, retry):
         surface.face_state[f] = BLOCKED
         _renew_stamps(scratch)
         is_nested = False
+        is_outside = False
         for k in order:
             if costs[k] >= rules.max_length2:
                 break
@@ -82,19 +131,21 @@ def sweep(surface, quadrics, watch, scratch, rules, first, last, colour, retry):
             outcome = contract_simple(surface, quadrics, watch, scratch, rules, 3 * f + k, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
-                is_nested = False
+                is_nested = is_outside = False
                 break
             surface.verdict[3 * f + k] = outcome
             is_nested |= outcome == NESTED
-        if is_nested:
-            scratch.lists[DEFERRED, scratch.tally[N_DEFERRED]] = f
-            scratch.tally[N_DEFERRED] += 1
+            is_outside |= outcome == OUTSIDE
+        if is_outside:
+            surface.face_state[f] = colour  # as if touched: other blocks will look at it
+        elif is_nested:
+            _defer(scratch, f)
     return n_contracted
 
 
 @kernel_in_place
-def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, first, last, colour):
-    """Contract at most one edge below ``rules.max_cost`` of each face from `first` to `last`.
+def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, thresholds, listed, blocks):
+    """Sweep over blocks with a threshold that grows: at most one edge of each face in each sweep.
 
     An edge that is refused waits for a higher threshold: for what it costs at the place where it
     can be contracted, or for RAISE times the present one.
@@ -102,9 +153,12 @@ def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, first, last, co
     Parameters
     ----------
     cost : float32 (3 m,)
-        Of the edge that begins at each corner.
-    colour : int
-        State that faces get when they are touched.
+        Of the edge that begins at each corner; up to date.
+    thresholds : float64 (n_sweeps,)
+    listed : int32
+        Faces, in the order in which they are looked at.
+    blocks : int64 (k, 4)
+        See :mod:`tetsimplify.blocks`.
 
     Returns
     -------
@@ -112,54 +166,77 @@ def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, first, last, co
         Number of contractions.
     """
     n_contracted = 0
-    for f in range(first, last):
+    for b in range(len(blocks)):
+        first, last = _enter(scratch, blocks, b)
+        for i in range(thresholds.size):
+            scratch.point[MAX_COST] = thresholds[i]
+            is_last = i + 1 == thresholds.size
+            n_contracted += _sweep_block_ranked(
+                surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last
+            )
+            rank_faces(surface, quadrics, rules, cost, listed, first, last)
+    return n_contracted
+
+
+@part
+def _sweep_block_ranked(
+    surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last
+):
+    """Sweep once over the faces listed; in the last sweep put off what is nested."""
+    n_contracted = 0
+    max_cost = scratch.point[MAX_COST]
+    for i in range(first, last):
+        f = listed[i]
         if surface.face_state[f] != RANKED:
             continue
-        if min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) >= rules.max_cost:
+        if min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) >= max_cost:
             continue
-        if rules.min_faces > 0 and scratch.tally[N_LIVE] - 2 < rules.min_faces:
+        if scratch.tally[N_SPARE] < 2:
             break
         _renew_stamps(scratch)
         is_nested = False
         for k in cheapest_first((cost[3 * f], cost[3 * f + 1], cost[3 * f + 2])):
             corner = 3 * f + k
-            if cost[corner] >= rules.max_cost:
+            if cost[corner] >= max_cost:
                 break
-            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
+            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, MOVED)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
                 is_nested = False
                 break
             _put_off(surface, scratch, rules, cost, corner, outcome)
             is_nested |= outcome == NESTED
-        if is_nested:
-            scratch.lists[DEFERRED, scratch.tally[N_DEFERRED]] = f
-            scratch.tally[N_DEFERRED] += 1
+        if is_nested and is_last:
+            _defer(scratch, f)
     return n_contracted
 
 
 @part
 def _put_off(surface, scratch, rules, cost, corner, outcome):
     """Note why an edge is refused, and the threshold that it waits for."""
+    if outcome == OUTSIDE:
+        return
     surface.verdict[corner] = outcome
     if outcome == TOO_DEAR:
         cost[corner] = scratch.point[COST]
     elif outcome == OBSTRUCTED or outcome == ERROR_BOUND:
         cost[corner] = np.inf  # until an end is contracted
     elif outcome != NESTED or rules.blocked == SKIP:  # nested ones are decided in `unblock`
-        cost[corner] = RAISE * rules.max_cost
+        cost[corner] = RAISE * scratch.point[MAX_COST]
 
 
 @kernel_in_place
-def unblock(surface, quadrics, watch, scratch, rules, cost, outer, colour, commit):
+def unblock(surface, quadrics, watch, scratch, rules, cost, outer, whole, colour, commit):
     """Contract at most one blocked edge of each of the faces put off.
 
     Parameters
     ----------
     outer : None or int
         How to tell which lens to keep: None by region growing, else PATH or DISTANCE.
+    whole : int64 (1, 6)
+        The whole surface as a block.
     colour : int
-        As of :func:`sweep`; faces that were touched in the same sweep are left.
+        State that faces get when they are touched. Faces touched since they were put off are left.
     commit : bool
         False to contract nothing, and only find out which of the edges that the removal limit
         holds are obstructed under these rules.
@@ -169,11 +246,13 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, colour, commi
     int
         Number of contractions.
     """
+    _enter(scratch, whole, 0)
     wanted = NESTED if commit else REMOVAL_LIMIT
+    waiting = BLOCKED if cost is None else RANKED
     n_contracted = 0
     for i in range(scratch.tally[N_DEFERRED]):
         f = scratch.lists[DEFERRED, i]
-        if surface.corner_vertex[3 * f] == DEAD or (commit and surface.face_state[f] == colour):
+        if surface.corner_vertex[3 * f] == DEAD or (commit and surface.face_state[f] != waiting):
             continue
         costs = edge_costs(surface.vertices, surface.corner_vertex, f)
         limit = rules.max_length2
@@ -183,7 +262,7 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, colour, commi
                 np.float64(cost[3 * f + 1]),
                 np.float64(cost[3 * f + 2]),
             )
-            limit = rules.max_cost
+            limit = scratch.point[MAX_COST]
         for k in cheapest_first(costs):
             corner = 3 * f + k
             if costs[k] >= limit:

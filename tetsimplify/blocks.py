@@ -1,0 +1,108 @@
+"""Blocks: compact pieces of the surface, which threads work on side by side.
+
+An edge belongs to a block when all faces at its ends do. So no two blocks touch the same face or
+move the same vertex, and they need no locks. What lies between blocks is done next time, when the
+surface is divided in another way. Blocks depend on the mesh alone, never on the number of threads.
+
+A block is a row of an array of shape (k, 4): where the faces to look at begin and end in a list,
+how many faces may go, and the number of the block.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tetsimplify import kernels
+from tetsimplify.mesh import Mesh
+
+FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
+CELL = 2**10  # faces: blocks are made of cells of about so many
+AT_ONCE = 16  # blocks in a task for a thread
+UNLIMITED = 2**62  # faces that may go
+MOST_BITS = 7  # of the cells along an axis
+SHIFT = 1.0 / 3.0  # of the extent, by which the cells of the second way are shifted: all planes
+# between them, on all levels of the curve, stay away from those of the first by a third of a cell
+
+Blocks = NDArray[np.int64]
+SPARE = 2  # the column
+
+
+class Cells(NamedTuple):
+    """The cells of the faces, in two ways."""
+
+    of_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
+    """Shapes (m,)."""
+    counts: tuple[int, int]
+
+
+def two_ways(mesh: Mesh) -> Cells:
+    """Cells of a mesh whose faces are in the order of a Z-order curve.
+
+    In the first way they follow that order, in the second one they are those of a shifted curve.
+    """
+    m = len(mesh.faces)
+    by_order = (np.arange(m) // CELL).astype(np.int32)
+    low = mesh.vertices.min(axis=0)
+    extent = float((mesh.vertices.max(axis=0) - low).max())
+    bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / CELL))), MOST_BITS)
+    scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
+    shifted, n_shifted = kernels.order.morton_cells(
+        mesh.vertices, mesh.faces, low - SHIFT * extent, scale, 2**bits - 1
+    )
+    return Cells((by_order, shifted), (m // CELL + 1, n_shifted))
+
+
+def copy_live(cells: Cells, corner_vertex: NDArray[np.int32], n_live: int) -> Cells:
+    """The cells of the faces that are live."""
+    live = np.empty((2, n_live), np.int32)
+    for way in range(2):
+        kernels.blocks.copy_cells(corner_vertex, cells.of_faces[way], live[way])
+    return Cells((live[0], live[1]), cells.counts)
+
+
+def divide(
+    cells: Cells,
+    way: int,
+    corner_vertex: NDArray[np.int32],
+    face_block: NDArray[np.int32],
+    listed: NDArray[np.int32],
+) -> Blocks:
+    """Divide the live faces.
+
+    Parameters
+    ----------
+    cells : Cells
+    way : {0, 1}
+    corner_vertex : ndarray, shape (3 m,), int32
+    face_block, listed : ndarray, shape (m,), int32
+        Filled: the block of each face, and the live faces block by block.
+    """
+    of_faces, n_cells = cells.of_faces[way], cells.counts[way]
+    begin = kernels.blocks.fill_blocks(corner_vertex, of_faces, n_cells, FACES, face_block, listed)
+    blocks = np.empty((len(begin) - 1, 4), np.int64)
+    blocks[:, 0], blocks[:, 1] = begin[:-1], begin[1:]
+    blocks[:, SPARE] = UNLIMITED
+    blocks[:, 3] = np.arange(len(blocks))
+    return blocks
+
+
+def whole(n_faces: int, n_spare: int = UNLIMITED) -> Blocks:
+    """All faces as one block, from which so many may go."""
+    return np.array([[0, n_faces, n_spare, 0]])
+
+
+def parts(n_faces: int, at_once: int) -> Blocks:
+    """All faces as one block, which is looked at in parts, one after the other."""
+    first = np.arange(0, n_faces, at_once)
+    blocks = whole(n_faces).repeat(len(first), axis=0)
+    blocks[:, 0], blocks[:, 1] = first, np.minimum(first + at_once, n_faces)
+    return blocks
+
+
+def allot(blocks: Blocks, n_spare: int, n_wanted: NDArray[np.int64]) -> None:
+    """Let faces go from blocks in proportion to the edges that are to be contracted there."""
+    blocks[:, SPARE] = n_wanted * (n_spare / max(1, int(n_wanted.sum())))

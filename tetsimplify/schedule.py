@@ -1,0 +1,94 @@
+"""In which order edges are contracted, and when that ends.
+
+Below one length the order hardly matters: sweeps are made until nothing is left to contract. By
+cost, and towards a number of faces, the cheapest edges go first: sweeps are made with a threshold
+that grows. Each threshold lets through a share of the edges that are left, so a few dozen sweeps do
+for a queue.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tetsimplify.engine import Engine
+from tetsimplify.options import Progress
+
+FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
+SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
+N_SWEEPS = 4  # with a threshold each, before costs are compared over the whole surface again
+
+
+def run(engine: Engine, progress: Progress | None = None) -> None:
+    """Contract until a criterion is reached, or no edge is left that the rules let go."""
+    if engine.options.has_one_threshold:
+        _run_below_length(engine, progress)
+    else:
+        _run_by_cost(engine, progress)
+    if progress is not None:
+        progress("contract", 1.0)
+
+
+def _run_below_length(engine: Engine, progress: Progress | None) -> None:
+    """Contract every edge below one length."""
+    if engine.is_divided:
+        for _ in range(2):  # in two ways
+            engine.sweep_divided(progress)
+            engine.compact_when_half()
+    retry = False
+    while True:
+        n_contracted = engine.sweep(retry, progress)
+        if n_contracted == 0 and retry:
+            return
+        retry = n_contracted * FULL_SWEEP <= engine.n_faces
+        engine.compact_when_half()
+
+
+def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
+    """Contract the cheapest edges first."""
+    n_given, least, n_barren, retry = engine.n_faces, engine.negligible_cost(), 0, False
+    engine.rank()
+    while not engine.has_enough:
+        thresholds = next_thresholds(engine, least, n_barren)
+        least = thresholds[-1]
+        done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
+        n_contracted = engine.sweep_ranked(thresholds, progress, done)
+        n_barren = 0 if n_contracted else n_barren + 1
+        if least == np.inf:
+            if retry and n_barren:
+                return
+            engine.forget_refusals()
+            retry = True
+        engine.compact_when_half()
+        engine.rank()
+
+
+def next_thresholds(engine: Engine, least: float, n_barren: int = 0) -> NDArray[np.float64]:
+    """Costs that growing shares of the edges are below, and no more than have to go.
+
+    Parameters
+    ----------
+    engine : Engine
+        With costs that are up to date.
+    least : float
+        A threshold that is not gone below: that of the sweep before.
+    n_barren : int
+        The number of times before that nothing could be contracted.
+
+    Returns
+    -------
+    ndarray, shape (k,), float64
+        One threshold for each sweep, ascending; infinite where all is to be tried.
+    """
+    costs = engine.sample_of_costs()
+    n_faces, min_faces = engine.n_faces, engine.min_faces
+    share = SHARES[0] if n_faces > 2 * min_faces else SHARES[1]
+    most = (n_faces - min_faces) / (3 * n_faces) if min_faces else 1.0
+    shares = 1.0 - (1.0 - share) ** np.arange(1, N_SWEEPS + 1)
+    shares = np.unique(np.minimum(shares, most))
+    shares = np.maximum(shares, 1.0 / max(1, len(costs))) * 2.0**n_barren
+    if not len(costs) or shares[0] > 1.0:
+        return np.array([np.inf])
+    last = len(costs) - 1
+    cheap = costs[np.minimum((np.minimum(shares, 1.0) * len(costs)).astype(np.int64), last)]
+    return np.maximum(least, np.nextafter(cheap, np.float32(np.inf)).astype(np.float64))
