@@ -122,12 +122,11 @@ def simplify(mesh: Any, *, return_report: bool = False, **options: Any) -> Any:
             f"{error} (see is_edge_manifold(), is_vertex_manifold(), is_orientable(); "
             "remove_non_manifold_edges() and orient_triangles() may help)"
         ) from error
-    of_vertices = result.vertex_data
-    if "normals" in of_vertices:
-        of_vertices["normals"] = _normalized(of_vertices["normals"])
     new_wedges = {name: rows for name, rows in result.wedge_data.items() if name != MATERIAL}
     new = to_open3d(
-        result.vertices, result.faces, of_vertices, result.face_data | new_wedges, like=mesh
+        *(result.vertices, result.faces, result.vertex_data),
+        result.face_data | new_wedges,
+        like=mesh,
     )
     if has_face_normals:
         new.compute_triangle_normals()
@@ -296,11 +295,6 @@ def _checked(mesh: Any) -> Any:
             f"{kind}"
         )
     return mesh
-
-
-def _normalized(normals: NDArray[Any]) -> NDArray[Any]:
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return (normals / np.where(lengths > 0, lengths, 1)).astype(normals.dtype)
 
 
 ADAPTER = Adapter("open3d", simplify, topology)

@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from tetsimplify.plugins.pymeshlab_arrays import (
+    CUSTOM,
     WEDGES,
     from_pymeshlab,
     in_rows,
@@ -26,6 +28,7 @@ from tetsimplify.options import (
     CRITERIA,
     DEFAULT_FOLDOVER,
     GUARDS_OF_QUADRICS,
+    INTERSECTIONS,
     OUTER,
     PLACEMENTS,
 )
@@ -108,6 +111,11 @@ def simplify_current_mesh(ms: pymeshlab.MeshSet, **parameters: Any) -> dict[str,
         edge itself, if not given.
     foldover : float
         Largest change of a face normal in one contraction, in degrees; 180 is no limit.
+    intersections : str
+        See :func:`tetsimplify.simplify`.
+    customattributes : bool
+        Interpolate the custom attributes of vertices too. Only for those that were made when the
+        mesh was in the set: PyMeshLab dies of others.
 
     Returns
     -------
@@ -163,13 +171,14 @@ def _simplify_in_place(ms: pymeshlab.MeshSet, options: dict[str, Any]) -> dict[s
             f"Failed to apply filter:  '{SIMPLIFY}. Current mesh does not have Any Faces."
         )
     mesh.compact()
-    given = from_pymeshlab(mesh, normals=False)
-    writer = Writer(ms)
+    writer = Writer(ms, expressions=options.pop("expressions"))
+    given = from_pymeshlab(mesh, writer.custom, normals=False)
     wedges = {name: rows for name, rows in given.face_data.items() if name == WEDGES}
-    if wedges and writer.has_attributes["f"]:
+    if wedges and writer.is_held["f"]:
         raise PyMeshLabException(
             f"Failed to apply filter: {SIMPLIFY}\nDetails: PyMeshLab cannot write texture "
-            "coordinates per wedge of a mesh that has custom attributes per face."
+            "coordinates per wedge of a mesh that has custom attributes per face. Where these were "
+            "made in this MeshSet, give customattributes=True."
         )
     if wedges and mesh.texture_number() > 1:
         wedges["texture"] = np.repeat(textures_of_faces(mesh)[:, None], 3, axis=1)
@@ -188,13 +197,19 @@ def _simplify_in_place(ms: pymeshlab.MeshSet, options: dict[str, Any]) -> dict[s
     result = seams.simplify(
         given.vertices,
         given.faces,
-        vertex_data={k: rows for k, rows in given.vertex_data.items() if not is_constant(rows)},
+        vertex_data={k: rows for k, rows in given.vertex_data.items() if _is_to_carry(k, rows)},
         wedge_data=wedges,
         locked=locked,
         **options,
     )
     writer.replace(with_ends(result, given, ends), given, selected)
     return _figures(mesh, result.report)
+
+
+def _is_to_carry(name: str, rows: NDArray[Any]) -> bool:
+    """Whether values of vertices have to be interpolated, and can be written."""
+    is_writable = not name.startswith(CUSTOM) or bool(np.isfinite(rows).all())
+    return is_writable and not is_constant(rows)
 
 
 def _extract_to_new_mesh(ms: pymeshlab.MeshSet, options: dict[str, Any]) -> dict[str, Any]:
@@ -284,6 +299,8 @@ FILTERS = {
             ),
             "outer": Parameter(str, "region", "outer", choices=OUTER),
             "foldover": Parameter(float, DEFAULT_FOLDOVER, "foldover", _unless(180)),
+            "intersections": Parameter(str, "allow", "intersections", choices=INTERSECTIONS),
+            "customattributes": Parameter(bool, False, "expressions"),
         },
     ),
     ISOSURFACE: Filter(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tetsimplify.plugins.pymeshlab_arrays import WEDGES, levels
+from tetsimplify.plugins.pymeshlab_arrays import CUSTOM, WEDGES, levels
 
 from tetsimplify import seams
 from tetsimplify.adapters import MeshArrays, needs
@@ -51,13 +52,31 @@ class Writer:
           d---e                      2---3                2---3
 
     Positions come from short-lived meshes, by morphing.
+
+    Parameters
+    ----------
+    ms : pymeshlab.MeshSet
+    expressions : bool
+        Use filters that evaluate expressions even where there are custom attributes. PyMeshLab
+        dies of them where a mesh had its attributes before it was added to the set.
+
+    Raises
+    ------
+    PyMeshLabException
+        When expressions are wanted and a custom attribute has a name that forbids them.
     """
 
-    def __init__(self, ms: pymeshlab.MeshSet) -> None:
+    def __init__(self, ms: pymeshlab.MeshSet, *, expressions: bool = False) -> None:
         self.ms, self.mesh = ms, ms.current_mesh()
         self.apply = partial(apply_filter, ms)
-        names = [key for key in filter_parameter_values(ms, "ply") if "__ca_" in key]
-        self.has_attributes = {kind: any(f"__ca_{kind}" in key for key in names) for kind in "vf"}
+        found = _custom_attributes(ms)
+        if expressions:
+            _check_names(self.mesh, found)
+        held = set() if expressions else {kind[0] for kind, _ in found}
+        self.is_held = {element: element in held for element in "vf"}
+        """Whether custom attributes forbid expressions, for vertices and for faces."""
+        self.custom = [name for kind, name in found if expressions and kind[0] == "v"]
+        """The custom attributes of vertices that can be written."""
 
     def replace(self, result: seams.Seamed, given: MeshArrays, selected: Selection) -> None:
         """Make the mesh that of a result."""
@@ -77,10 +96,15 @@ class Writer:
         if len(order) == 0:  # all gone, as can happen when the topology may be violated
             return
         self._write_colors_and_scalars(keys, {k: x[order] for k, x in result.vertex_data.items()})
-        if "tex_coord" in result.vertex_data and not self.has_attributes["v"]:
-            self._write_tex_coords(result.vertex_data["tex_coord"][order])
+        written = {name: values[order] for name, values in result.vertex_data.items()}
+        if "tex_coord" in written and not self.is_held["v"]:
+            self._write_tex_coords(written["tex_coord"])
+        for name in self.custom:
+            if CUSTOM + name in written:
+                self._write_custom(name, written[CUSTOM + name])
         if WEDGES in result.wedge_data:
             self._write_wedges(result.faces, result.wedge_data[WEDGES], order)
+        if not np.array_equal(self.mesh.vertex_matrix(), keys):
             self._move(keys)
         self._select(keys, order, result, selected)
         self._move(result.vertices[order])
@@ -134,7 +158,7 @@ class Writer:
         chosen = selected.faces[result.face_map]
         if chosen.all():
             self.apply("set_selection_all", allverts=False)
-        elif chosen.any() and not self.has_attributes["f"]:
+        elif chosen.any() and not self.is_held["f"]:
             self._select_faces(result.faces, chosen, order)
             self._move(keys)
         elif chosen.any():  # of a face with a vertex that only selected faces have
@@ -199,6 +223,17 @@ class Writer:
         self._move(np.column_stack([uv, np.zeros(len(uv))]))
         self.apply("compute_texcoord_by_function_per_vertex", u="x", v="y")
 
+    def _write_custom(self, name: str, values: NDArray[np.float64]) -> None:
+        """Write a custom attribute of the vertices, from vertices that are moved to its values."""
+        rows = np.zeros((len(values), 3))
+        rows[:, : values[0].size] = values.reshape(len(values), -1)
+        self._move(rows)
+        if values.ndim == 1:
+            self.apply("compute_new_custom_scalar_attribute_per_vertex", name=name, expr="x")
+        else:
+            expressions = {f"{axis}_expr": axis for axis in "xyz"}
+            self.apply("compute_new_custom_point_attribute_per_vertex", name=name, **expressions)
+
     def _write_wedges(
         self, faces: NDArray[np.int32], uv: NDArray[np.float64], order: NDArray[np.int64]
     ) -> None:
@@ -224,6 +259,31 @@ class Writer:
                 onselected=True,
             )
             left &= ~self.mesh.face_selection_array()
+
+
+def _custom_attributes(ms: pymeshlab.MeshSet) -> list[tuple[str, str]]:
+    """Kind and name of the custom attributes of the current mesh; "vs" are scalars of vertices."""
+    start = "__ca_"  # __ca_vs__name, among the parameters for saving a file
+    keys = [key for key in filter_parameter_values(ms, "ply") if key.startswith(start)]
+    return [(key[5:7], key[9:]) for key in keys]
+
+
+def _check_names(mesh: pymeshlab.Mesh, attributes: list[tuple[str, str]]) -> None:
+    """Refuse names that are none in expressions, or mean something else there."""
+    own = {f"{axis}{k}" for axis in "xyz" for k in ("", 0, 1, 2)}
+    for kind, name in attributes:
+        element = "vertex" if kind[0] == "v" else "face"
+        values = "scalar_attribute_array" if kind[1] == "s" else "point_attribute_matrix"
+        try:  # spaces in names are listed as underscores
+            getattr(mesh, f"{element}_custom_{values}")(name)
+            is_sound = re.fullmatch("[A-Za-z_][A-Za-z_0-9]*", name) and name not in own
+        except PyMeshLabException:
+            is_sound = None
+        if not is_sound:
+            raise PyMeshLabException(
+                f"customattributes=True: PyMeshLab cannot have {name!r} in expressions: a custom "
+                "attribute needs a name of letters, digits and _ that is no coordinate."
+            )
 
 
 def _keys(index: NDArray[Any], unit: float) -> NDArray[np.float64]:

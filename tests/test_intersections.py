@@ -11,7 +11,7 @@ import naive_intersections as naive
 import strategies
 import tetsimplify
 from data import data_dir, needs_data
-from tetsimplify import intersections, io
+from tetsimplify import blocks, intersections, io
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
 from tetsimplify.intersections import self_intersections
@@ -381,6 +381,9 @@ def test_beside_pymeshlab(path):
 # ------------------------------------------------------------------------------- contractions
 
 
+WHOLE = blocks.whole(0)
+
+
 @numba.njit
 def find_crossing(watch, surface, scratch, rules, corner):
     """1 or 0, whether contracting an edge makes faces cross; -1 where it cannot be contracted."""
@@ -403,7 +406,7 @@ def contract(watch, surface, scratch, rules, corner):
     surface.verdict[corner] = NESTED
     scratch.lists[DEFERRED, 0] = face
     scratch.tally[N_DEFERRED] = 1
-    unblock(surface, None, None, scratch, rules, None, None, SETTLED, True)
+    unblock(surface, None, None, scratch, rules, None, None, WHOLE, SETTLED, True)
     star = scratch.lists[STAR_V]
     n = 1
     corner = surface.next_corner[star[0]]

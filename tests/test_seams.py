@@ -7,7 +7,7 @@ import pytest
 
 import meshes
 from strategies import adversarial_mesh
-from tetsimplify import MeshError, extract_isosurface, seams, topology
+from tetsimplify import MeshError, copies, cutting, extract_isosurface, seams, topology
 from tetsimplify.mesh import Mesh
 
 
@@ -50,7 +50,7 @@ def same_values_at_each_vertex(faces, wedges) -> bool:
 def test_cut_leaves_one_value_at_each_vertex_and_can_be_undone(seed):
     mesh = Mesh(*adversarial_mesh(seed))
     wedges = np.repeat(charts(mesh, seed)[:, None], 3, axis=1).astype(float)
-    parts = seams.cut(mesh.faces, wedges, len(mesh.vertices))
+    parts = cutting.cut(mesh.faces, wedges, len(mesh.vertices))
     assert same_values_at_each_vertex(parts.faces, wedges)
     np.testing.assert_array_equal(parts.origin[parts.faces], mesh.faces)
     np.testing.assert_array_equal(parts.origin[: len(mesh.vertices)], np.arange(len(mesh.vertices)))
@@ -64,7 +64,7 @@ def test_a_mesh_without_seams_is_not_cut():
     u = mesh.vertices[mesh.faces, 0]
     u[:3] = np.nan  # as values that nobody has set: no seam between NaN and NaN
     u[np.isin(mesh.faces, mesh.faces[:3])] = np.nan
-    parts = seams.cut(mesh.faces, u, len(mesh.vertices))
+    parts = cutting.cut(mesh.faces, u, len(mesh.vertices))
     assert parts.faces is not None and len(parts.origin) == len(mesh.vertices)
     assert not parts.on_seam.any()
 
@@ -74,7 +74,7 @@ def test_the_end_of_a_seam_is_on_it_but_not_copied():
     x = mesh.vertices[mesh.faces].mean(axis=1)[:, 0]
     at_seam = (mesh.vertices[mesh.faces, 0] == 4) & (mesh.vertices[mesh.faces, 1] < 3.5)
     wedges = np.where(at_seam & (x > 4)[:, None], 1.0, 0.0)
-    parts = seams.cut(mesh.faces, wedges, len(mesh.vertices))
+    parts = cutting.cut(mesh.faces, wedges, len(mesh.vertices))
     ends = np.flatnonzero(parts.on_seam[: len(mesh.vertices)])
     assert len(ends) == len(parts.origin) - len(mesh.vertices) + 1
     assert topology(mesh.vertices[parts.origin], parts.faces).n_boundary_loops == 1
@@ -101,7 +101,7 @@ def many_places() -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", many_places())
 def test_places_finds_exactly_equal_positions(name):
     vertices = many_places()[name]
-    found = seams.places(vertices)
+    found = copies.places(vertices)
     np.testing.assert_array_equal(vertices[found], vertices)
     assert len(np.unique(found)) == len(np.unique(vertices, axis=0))
 
@@ -140,7 +140,7 @@ def test_topology_and_charts_are_kept(seed, length):
 def test_copies_of_vertices_stay_together(seed):
     mesh = Mesh(*adversarial_mesh(seed))
     wedges = np.repeat(charts(mesh, seed)[:, None], 3, axis=1)
-    parts = seams.cut(mesh.faces, wedges, len(mesh.vertices))
+    parts = cutting.cut(mesh.faces, wedges, len(mesh.vertices))
     vertices = mesh.vertices[parts.origin]
     result = seams.simplify(
         vertices,

@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 
 from tetsimplify import kernels
 
+NORMALS = ("normal", "normals")
+"""Names of vertex data, capitals aside, that are directions: they are given unit length again."""
+
+WEDGE = "\0"
+"""Before the names of data of face corners among vertex data, which may have the same names."""
+
+SHORTEST = 1e-6  # of its length: what is left of a normal that has a direction still
+
 
 class VertexWeights(NamedTuple):
     """How the vertices of a result are made of those given."""
@@ -23,6 +31,9 @@ class VertexWeights(NamedTuple):
         self, data: dict[str, NDArray[Any]], vertex_map: NDArray[np.int32]
     ) -> dict[str, NDArray[Any]]:
         """Data of the result: floats interpolated, all else from the nearer end.
+
+        Interpolated normals are shorter than what they are made of. They get unit length again;
+        where they cancel out it is the normal from the nearer end.
 
         Parameters
         ----------
@@ -39,8 +50,26 @@ class VertexWeights(NamedTuple):
             if values.dtype.kind == "f":
                 rows = values.reshape(n, -1).astype(np.float64)
                 kernels.carry.interpolate(self.merges, self.merged_into, rows)
-                rows = rows[survives].astype(values.dtype)
-                carried[name] = rows.reshape(-1, *values.shape[1:])
+                rows = rows[survives]
+                if is_normals(name, values):
+                    _restore_length(rows, values[nearest[survives]])
+                carried[name] = rows.astype(values.dtype).reshape(-1, *values.shape[1:])
             else:
                 carried[name] = values[nearest[survives]]
         return carried
+
+
+def is_normals(name: str, values: NDArray[Any]) -> bool:
+    """Whether data of a name are normals."""
+    has_shape = values.dtype.kind == "f" and values.ndim == 2 and values.shape[1] == 3
+    return has_shape and name.removeprefix(WEDGE).lower() in NORMALS
+
+
+def _restore_length(rows: NDArray[np.float64], nearest: NDArray[Any]) -> None:
+    """Give the rows that are not those of the nearest vertex unit length."""
+    mixed = np.flatnonzero((rows != nearest).any(axis=1))
+    lengths = np.linalg.norm(rows[mixed], axis=1)
+    cancelled = lengths < SHORTEST * np.linalg.norm(nearest[mixed], axis=1)
+    rows[mixed[cancelled]] = nearest[mixed[cancelled]]
+    lengths = np.linalg.norm(rows[mixed], axis=1)
+    rows[mixed] /= np.where(lengths > 0.0, lengths, 1.0)[:, None]

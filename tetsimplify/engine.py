@@ -73,6 +73,7 @@ class Engine:
     Attributes
     ----------
     topology_before : TopologyReport
+    n_threads : int
     min_faces : int
         So many faces are to be left.
 
@@ -115,7 +116,7 @@ class Engine:
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
         self._idle: SimpleQueue[Scratch] = SimpleQueue()
-        self._threads = Crew(threads).n_threads
+        self.n_threads = Crew(threads).n_threads
 
     @property
     def n_faces(self) -> int:
@@ -138,6 +139,16 @@ class Engine:
     def _n_spare(self) -> int:
         """How many faces may still go."""
         return self.n_faces - self.min_faces if self.min_faces else blocks.UNLIMITED
+
+    @property
+    def on_boundary(self) -> NDArray[np.bool_]:
+        """Shape (n,): which vertices are on a boundary loop."""
+        is_on: NDArray[np.bool_] = self._surface.loop[self._arranged.vertex_place] >= 0
+        return is_on
+
+    def lock(self, vertices: NDArray[np.bool_]) -> None:
+        """Lock more vertices, before the run."""
+        self._surface.locked[:] |= vertices[self._arranged.vertex_origin]
 
     def tally(self, name: str) -> int:
         """One of the counters of :mod:`tetsimplify.kernels.state`, by its name."""
@@ -208,10 +219,15 @@ class Engine:
             bundles = self._surface, self._quadrics, self.rules, self._cost
             kernels.cost.rank(*bundles, self._listed, part.start, part.stop)
 
-        Crew(self._threads).share(task, len(self._face_origin), blocks.FACES * blocks.AT_ONCE)
+        Crew(self.n_threads).share(task, len(self._face_origin), blocks.FACES * blocks.AT_ONCE)
 
     def sweep_ranked(
-        self, thresholds: NDArray[np.float64], progress: Progress | None = None, done: float = 0.0
+        self,
+        thresholds: NDArray[np.float64],
+        progress: Progress | None = None,
+        done: float = 0.0,
+        *,
+        divided: bool = False,
     ) -> int:
         """Sweep with each threshold in turn, and contract edges that cost less.
 
@@ -222,6 +238,8 @@ class Engine:
         progress : callable, optional
         done : float
             What to tell it.
+        divided : bool
+            Sweep over blocks. Each of them may lose its share of the faces that may go.
 
         Returns
         -------
@@ -235,7 +253,7 @@ class Engine:
             lists = self._cost, thresholds, self._listed
             return int(kernels.sweep.sweep_ranked(*bundles, *lists, some))
 
-        if self.is_divided:
+        if divided:
             all_blocks = self._divide()
             n_cheaper = kernels.cost.count_cheaper(
                 self._cost, self._listed, all_blocks, thresholds[-1]
@@ -323,7 +341,7 @@ class Engine:
             assert progress is not None
             progress("contract", span[0] + (span[1] - span[0]) * done)
 
-        crew = Crew(self._threads, None if progress is None else tell)
+        crew = Crew(self.n_threads, None if progress is None else tell)
         n_contracted = 0
         for done in crew.share(do, len(all_blocks), blocks.AT_ONCE):
             n_before = self.tally("N_SIMPLE") + self.tally("N_NESTED")

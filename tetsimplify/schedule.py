@@ -52,7 +52,9 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
         thresholds = next_thresholds(engine, least, n_barren)
         least = thresholds[-1]
         done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
-        n_contracted = engine.sweep_ranked(thresholds, progress, done)
+        n_contracted = engine.sweep_ranked(
+            thresholds, progress, done, divided=engine.is_divided and not n_barren
+        )
         n_barren = 0 if n_contracted else n_barren + 1
         if least == np.inf:
             if retry and n_barren:

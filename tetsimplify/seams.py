@@ -1,52 +1,48 @@
-r"""Simplification of meshes with seams, for the adapters.
+"""Simplification of meshes with seams: borders that stay where they are.
 
-A texture seam is a path of edges on whose two sides the same vertices have different texture
-coordinates. Some programs hold the values at face corners (wedges), others hold two copies of
-each vertex of the seam, so that the mesh is open there::
+A seam is a path of edges where data jump: on its two sides the same vertices have different
+texture coordinates, or faces have different labels. Some programs hold the values at face corners
+(wedges), others hold copies of each vertex of the seam, so that the mesh is open there.
 
-    one vertex, two values             two vertices in one place
-
-       \   |a   b|   /                     \   |     |   /
-        \  |a   b|  /                       \  |a   b|  /
-    -----  v-----v  -----    cut ->     -----  v     v'  -----
-        /  |a   b|  \                       /  |a   b|  \
-       /   |a   b|   \      <- weld        /   |     |   \
-
-:func:`simplify` does both: wedges are cut apart first. The vertices on the seam are locked, so
-both sides stay where they are: nothing tears and nothing bleeds. Then the copies are welded.
+:func:`simplify` does both: wedges and labels are cut apart first, see :mod:`tetsimplify.cutting`.
+Then each region of labels is a surface of its own, whose topology is kept. The vertices on the
+seam are locked, so both sides stay where they are: nothing tears and nothing bleeds. Then the
+copies are welded.
 
 What could still go wrong is that the two sides, each for itself, come to have an edge between
 the same two vertices of the seam, which would be one edge of four faces when they are welded,
 or a face between the same three.
-This is looked for, and where it happens all is done again with the neighbours of the seam
-locked as well, which excludes it: no contraction then reaches a face at the seam.
+This is looked for, and where it happens all is done again with the neighbours of these vertices
+locked as well, so that their faces stay as they are. After a few rounds all neighbours of the seam
+are locked, which excludes it everywhere: no contraction then reaches a face at the seam.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tetsimplify.arrays import as_mesh, as_vertex_mask
-from tetsimplify.errors import MeshError
+from tetsimplify.arrays import as_data, as_mesh, as_vertex_mask, listed
+from tetsimplify.contract import Clock, after_repair, contract
+from tetsimplify.copies import Seam, clashes, followed, n_shared, with_copies
+from tetsimplify.cutting import at_vertices, cut, edge_keys, weld
+from tetsimplify.data import WEDGE
+from tetsimplify.engine import Engine
+from tetsimplify.errors import MeshError, OptionError
 from tetsimplify.mesh import Mesh
+from tetsimplify.options import Options, Progress
 from tetsimplify.repair import repair as repair_mesh
 from tetsimplify.report import Repaired, Simplification, SimplificationReport
-from tetsimplify.simplify import simplify as simplify_arrays
-from tetsimplify.topology import topology
+from tetsimplify.topology import TopologyReport, topology
 
 Array = NDArray[Any]
 Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
-MIXING = (0.2718281828459045, 0.3141592653589793, 0.1618033988749895)  # of x, y, z to one number
-SPREADING = np.uint64(0x9E3779B97F4A7C15)  # odd, so that no two numbers become one
-MOST_THROWS = 32  # far more than a hash that tells the places apart needs
-WEDGE = "\0"  # before the names of wedge data among vertex data, which may have the same names
+MOST_ROUNDS = 4  # in the last of these all neighbours of the seam are locked
 
 
 class Seamed(NamedTuple):
@@ -67,34 +63,39 @@ class Seamed(NamedTuple):
     """Shapes (m, 3, ...)."""
 
 
-class Cut(NamedTuple):
-    """A mesh cut open along its seams."""
+class Asked(NamedTuple):
+    """What `seams` names."""
 
-    faces: Indices
-    """Shape (m, 3)."""
-    origin: Indices
-    """Shape (n cut,): the vertex that each one is a copy of. The first copies keep the numbers
-    of their origins, the others follow."""
-    on_seam: Mask
-    """Shape (n cut,): vertices that lie on a seam, copied or not (at the end of a seam)."""
+    edges: Indices
+    """Shape (k, 2)."""
+    labels: list[Array]
+    """Of the faces, shapes (m, ...)."""
+    wedges: list[str]
+    """Names of face data of shape (m, 3, ...) that belong to the corners."""
+    copies: bool
+    """Whether vertices in one place stay together."""
 
 
 def simplify(
     vertices: ArrayLike,
     faces: ArrayLike,
     *,
-    vertex_data: Mapping[str, Array] | None = None,
-    face_data: Mapping[str, Array] | None = None,
-    wedge_data: Mapping[str, Array] | None = None,
+    vertex_data: Mapping[str, ArrayLike] | None = None,
+    face_data: Mapping[str, ArrayLike] | None = None,
+    wedge_data: Mapping[str, ArrayLike] | None = None,
+    seams: ArrayLike | None = None,
+    copies: bool = True,
     colours: Collection[str] | None = None,
     locked: ArrayLike | None = None,
     repair: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Seamed:
     """Simplify a mesh with its attributes; seams neither tear nor bleed.
 
-    A seam is where wedge data differ at one vertex, or where vertices on the boundary are in
-    exactly the same place as others there. Neither is merged with the other.
+    A seam is where wedge data differ at one vertex, where `seams` says so, or where vertices on
+    the boundary are in exactly the same place as others there. Neither is merged with the other.
 
     Parameters
     ----------
@@ -103,10 +104,14 @@ def simplify(
     wedge_data : mapping of names to arrays, shapes (m, 3, ...)
         Values at the corners of the faces. A material of each face goes in here as well,
         repeated for its corners: then borders of materials are seams.
+    seams : array_like or str or list of str, optional
+        As in :func:`tetsimplify.simplify`.
+    copies : bool
+        Whether vertices on the boundary that are in one place are copies of one.
     colours : collection of str, optional
         Integer vertex and wedge data that are to be interpolated and rounded; None takes those
         of 8 bits with 3 or 4 components. Other integers are labels, which are never averaged.
-    locked, repair, **options
+    locked, repair, threads, progress, **options
         As in :func:`tetsimplify.simplify`.
 
     Returns
@@ -129,346 +134,187 @@ def simplify(
     >>> bool(np.isin(result.wedge_data["u"] - x_of_wedges, (0, 10)).all())
     True
     """
-    mesh = as_mesh(vertices, faces)
-    held = as_vertex_mask("locked", locked, len(mesh.vertices))
-    of_vertices, of_faces, of_wedges = (
-        {name: np.asarray(values) for name, values in (data or {}).items()}
-        for data in (vertex_data, face_data, wedge_data)
-    )
-    repaired = repair_mesh(*mesh) if repair else None
-    if repaired is not None:
-        of_wedges = _turned(of_wedges, mesh.faces, repaired)
-        of_faces = {name: values[repaired.face_map] for name, values in of_faces.items()}
-        of_vertices = {name: data[repaired.vertex_origin] for name, data in of_vertices.items()}
-        held = held[repaired.vertex_origin]
-        mesh = Mesh(repaired.vertices, repaired.faces)
+    clock, checked = Clock(), Options(**options)
+    with clock.stage("check"):
+        mesh = as_mesh(vertices, faces)
+        held = as_vertex_mask("locked", locked, len(mesh.vertices))
+        of_vertices = as_data("vertex_data", vertex_data, len(mesh.vertices))
+        of_faces, of_wedges = (
+            as_data(name, data, len(mesh.faces))
+            for name, data in (("face_data", face_data), ("wedge_data", wedge_data))
+        )
+        asked = _asked(seams, mesh, of_vertices, of_faces, of_wedges)
+        if seams is not None and checked.blocked == "violate":
+            raise OptionError("seams need a topology that is kept, not blocked='violate'")
+        of_wedges |= {name: of_faces.pop(name) for name in asked.wedges}
+        repaired = repair_mesh(*mesh) if repair else None
+        if repaired is not None:
+            asked = _repaired(asked, repaired)
+            of_wedges = _turned(of_wedges, mesh.faces, repaired)
+            of_faces = {name: values[repaired.face_map] for name, values in of_faces.items()}
+            of_vertices = {name: data[repaired.vertex_origin] for name, data in of_vertices.items()}
+            held = held[repaired.vertex_origin]
+            mesh = Mesh(repaired.vertices, repaired.faces)
 
-    parts = cut(mesh.faces, of_wedges.values(), len(mesh.vertices))
-    seam = _with_copies(_Seam(parts.origin, parts.on_seam), mesh)
-    is_cut = len(parts.origin) > len(mesh.vertices)
-    opened, values = Mesh(mesh.vertices, parts.faces), dict(of_vertices)
-    if is_cut:
-        opened, held = Mesh(mesh.vertices[parts.origin], parts.faces), held[parts.origin]
-        values = {name: data[parts.origin] for name, data in of_vertices.items()}
-    values |= {_wedge(name): _at_vertices(data, parts) for name, data in of_wedges.items()}
+        corners = [*of_wedges.values(), *(np.stack([x] * 3, axis=1) for x in asked.labels)]
+        edges = asked.edges if len(asked.edges) else None
+        parts = cut(mesh.faces, corners, len(mesh.vertices), edges)
+        is_cut = len(parts.origin) > len(mesh.vertices)
+        opened, values = Mesh(mesh.vertices, parts.faces), dict(of_vertices)
+        if is_cut:
+            before = _manifold(mesh)
+            opened, held = Mesh(mesh.vertices[parts.origin], parts.faces), held[parts.origin]
+            values = {name: data[parts.origin] for name, data in of_vertices.items()}
+        values |= {_wedge(name): at_vertices(data, parts) for name, data in of_wedges.items()}
+        averaged = _colours(values) if colours is None else set(colours)
+        averaged = {name for name in values if {name, name.removeprefix(WEDGE)} & averaged}
+        types = {name: values[name].dtype for name in averaged}
+        values |= {name: values[name].astype(np.float64) for name in averaged}
 
-    averaged = _colours(values) if colours is None else set(colours)
-    averaged = {name for name in values if {name, name.removeprefix(WEDGE)} & averaged}
-    types = {name: values[name].dtype for name in averaged}
-    values |= {name: values[name].astype(np.float64) for name in averaged}
-    result = _simplify_cut(
-        opened, seam, locked=held, vertex_data=values, face_data=of_faces, **options
+        engine = Engine(opened, checked, held | parts.on_seam, threads=threads)
+        seam = Seam(parts.origin, parts.on_seam)
+        if copies or asked.copies:
+            seam = with_copies(seam, opened.vertices, engine.on_boundary)
+            engine.lock(seam.on_seam)
+
+    result = _contract_cut(
+        engine,
+        opened,
+        seam,
+        locked=held,
+        vertex_data=values,
+        face_data=of_faces,
+        progress=progress,
+        clock=clock,
     )
-    carried = dict(result.vertex_data)
-    carried |= {name: _rounded(carried[name], dtype) for name, dtype in types.items()}
-    new_wedges = {name: carried.pop(_wedge(name))[result.faces] for name in of_wedges}
-    result = result._replace(vertex_data=carried)
-    if is_cut:
-        result = weld(mesh, result, parts.origin)
-    if repaired is not None:
-        result = _composed(result, repaired)
+    with clock.stage("report"):
+        carried = dict(result.vertex_data)
+        carried |= {name: _rounded(carried[name], dtype) for name, dtype in types.items()}
+        new_wedges = {name: carried.pop(_wedge(name))[result.faces] for name in of_wedges}
+        result = result._replace(vertex_data=carried)
+        if is_cut:
+            result = weld(mesh, before, result, parts.origin)
+        if repaired is not None:
+            result = after_repair(result, repaired)
     return Seamed(*result, new_wedges)
 
 
-# --- cutting -------------------------------------------------------------------------------------
-
-
-def cut(faces: ArrayLike, wedge_values: Collection[Array] | Array, n_vertices: int) -> Cut:
-    """Cut a mesh open along the edges on whose two sides wedge values differ.
-
-    Parameters
-    ----------
-    faces : array_like, shape (m, 3)
-    wedge_values : ndarray or collection of ndarray, shapes (m, 3, ...)
-    n_vertices : int
-
-    Returns
-    -------
-    Cut
-        After it all wedges at a vertex have the same values. Vertices that only touch the
-        end of a seam are not copied; a vertex that two seams cross gets a copy for each fan
-        of faces between them, even where some of these have the same values.
-    """
-    triangles = np.asarray(faces, dtype=np.int32)
-    arrays = [wedge_values] if isinstance(wedge_values, np.ndarray) else list(wedge_values)
-    rows = [values.reshape(triangles.size, -1) for values in arrays if values.size]
-    uncut = Cut(triangles, np.arange(n_vertices, dtype=np.int32), np.zeros(n_vertices, np.bool_))
-    torn = _torn_vertices(triangles, rows, n_vertices)
-    if not torn.any():
-        return uncut
-
-    # only faces two rings around such vertices matter
-    near = np.zeros(n_vertices, np.bool_)
-    near[triangles[torn[triangles].any(axis=1)]] = True
-    corners = _corners(np.flatnonzero(near[triangles].any(axis=1)))
-    sides = _paired_sides(triangles.reshape(-1), corners)
-    differs = [_differ(rows, here, there) for here, there in sides]
-    is_seam = differs[0] | differs[1]
-    on_seam = np.zeros(n_vertices, np.bool_)
-    on_seam |= torn
-    for here, _ in sides:
-        on_seam[triangles.reshape(-1)[here[is_seam]]] = True
-
-    corners = corners[on_seam[triangles.reshape(-1)[corners]]]
-    joined = np.concatenate([np.stack(side)[:, ~is_seam] for side in sides], axis=1)
-    fans = _fans(corners, joined, triangles.size)
-    new_faces = triangles.reshape(-1).copy()
-    first, fan_of_corner = np.unique(fans, return_inverse=True)
-    fan_vertex = new_faces[first].copy()
-    _, keeps_number = np.unique(fan_vertex, return_index=True)
-    is_copy = np.ones(len(first), np.bool_)
-    is_copy[keeps_number] = False
-    number = fan_vertex.copy()
-    number[is_copy] = n_vertices + np.arange(is_copy.sum())
-    new_faces[corners] = number[fan_of_corner]
-    origin = np.concatenate([uncut.origin, fan_vertex[is_copy]])
-    return Cut(new_faces.reshape(-1, 3), origin, on_seam[origin])
-
-
-def _torn_vertices(triangles: Indices, rows: list[Array], n_vertices: int) -> Mask:
-    """Vertices with different values at their corners."""
-    torn = np.zeros(n_vertices, np.bool_)
-    if not rows:
-        return torn
-    corner_vertex = triangles.reshape(-1)
-    last = np.zeros(n_vertices, np.int64)
-    last[corner_vertex] = np.arange(len(corner_vertex))
-    for values in rows:
-        torn[corner_vertex[_differ([values], np.arange(len(values)), last[corner_vertex])]] = True
-    return torn
-
-
-def _differ(rows: list[Array], here: Array, there: Array) -> Mask:
-    """Whether values at pairs of corners differ; NaN does not differ from NaN."""
-    result = np.zeros(len(here), np.bool_)
-    for values in rows:
-        a, b = values[here], values[there]
-        unequal = a != b
-        if values.dtype.kind in "fc":
-            unequal &= (a == a) | (b == b)
-        result |= unequal.any(axis=1)
-    return result
-
-
-def _corners(faces: Array) -> Array:
-    """The corners of some faces."""
-    return (3 * faces[:, None] + np.arange(3)).reshape(-1)
-
-
-def _paired_sides(corner_vertex: Indices, corners: Array) -> list[tuple[Array, Array]]:
-    """The pairs of faces at edges, as pairs of corners at the lower and at the higher end."""
-    heads = np.where(corners % 3 == 2, corners - 2, corners + 1)
-    flip = corner_vertex[corners] > corner_vertex[heads]
-    low, high = np.where(flip, heads, corners), np.where(flip, corners, heads)
-    key = corner_vertex[low].astype(np.int64) << 32 | corner_vertex[high]
-    order = np.argsort(key, kind="stable")
-    pair = np.flatnonzero(key[order[:-1]] == key[order[1:]])
-    here, there = order[pair], order[pair + 1]
-    return [(low[here], low[there]), (high[here], high[there])]
-
-
-def _fans(corners: Array, joined: Array, n_corners: int) -> Array:
-    """The lowest corner of the fan that each of `corners` is in."""
-    label = np.arange(n_corners)
-    a, b = joined
-    while True:
-        lowest = np.minimum(label[a], label[b])
-        if np.array_equal(lowest, label[a]) and np.array_equal(lowest, label[b]):
-            result: Array = label[corners]
-            return result
-        np.minimum.at(label, a, lowest)
-        np.minimum.at(label, b, lowest)
-        label = label[label]
-
-
-def _at_vertices(wedges: Array, parts: Cut) -> Array:
-    """Wedge values as values of the vertices of the cut mesh."""
-    values = np.zeros((len(parts.origin), *wedges.shape[2:]), wedges.dtype)
-    values[parts.faces] = wedges
-    return values
-
-
-def _wedge(name: str) -> str:
-    """The key of wedge data among vertex data."""
-    return WEDGE + name
-
-
-# --- copies of vertices --------------------------------------------------------------------------
-
-
-def places(vertices: NDArray[np.float64]) -> Indices:
-    """For each vertex one in exactly the same place, the same one for all that are there.
-
-    The vertices are thrown into slots by a hash of their coordinates. The last one in a slot wins
-    it; those in its place are found with it, and all others are thrown again.
-    """
-    x, y, z = vertices.T
-    mixed = x * MIXING[0]
-    mixed += y * MIXING[1]
-    mixed += z * MIXING[2]
-    mixed += 0.0  # makes -0.0 equal to 0.0
-    keys = mixed.view(np.uint64)
-    result = np.arange(len(vertices), dtype=np.int32)
-    left = result
-    for _ in range(MOST_THROWS):
-        keys = keys * SPREADING
-        n_bits = len(left).bit_length() + 1
-        slots = (keys >> np.uint64(64 - n_bits)).view(np.int64)
-        entries = np.arange(len(left), dtype=np.int32)
-        winner_of_slot = np.empty(2**n_bits, np.int32)
-        winner_of_slot[slots] = entries
-        winners = winner_of_slot[slots]
-        losers = np.flatnonzero(winners != entries)
-        winners = winners[losers]
-        same = keys[winners] == keys[losers]
-        a, b = left[winners[same]], left[losers[same]]
-        same[same] = found = (vertices[a] == vertices[b]).all(axis=1)
-        result[b[found]] = a[found]
-        losers = losers[~same]
-        left, keys = left[losers], keys[losers]
-        if len(left) == 0:
-            return result
-    # many places have one hash, as where coordinates differ by less than sums of them can show
-    _, first, which = np.unique(vertices[left], axis=0, return_index=True, return_inverse=True)
-    result[left] = left[first[which.reshape(-1)]]
-    return result
-
-
-def _with_copies(seam: _Seam, mesh: Mesh) -> _Seam:
-    """The seam, and in addition the vertices on the boundary that have copies there."""
-    place = places(mesh.vertices)
-    copies = np.flatnonzero(place != np.arange(len(place)))
-    if len(copies) == 0:
-        return seam
-    shared = np.zeros(len(place), np.bool_)
-    shared[place[copies]] = True
-    shared = _on_boundary(mesh.faces, shared[place])
-    n_copies = np.bincount(place[shared], minlength=len(place))
-    on_seam = shared & (n_copies > 1)[place]
-    place = np.where(on_seam, place, np.arange(len(place), dtype=np.int32))
-    return _Seam(place[seam.place], on_seam[seam.place] | seam.on_seam)
-
-
-def _on_boundary(faces: Indices, among: Mask) -> Mask:
-    """Which vertices of a set are at edges with one face."""
-    near = faces[among[faces].any(axis=1)]
-    edges, counts = np.unique(_edge_keys(near), return_counts=True)
-    lonely = edges[counts == 1]
-    result = np.zeros(len(among), np.bool_)
-    result[lonely >> 32] = True
-    result[lonely & 0xFFFFFFFF] = True
-    return result & among
-
-
-def _edge_keys(faces: Indices) -> NDArray[np.int64]:
-    """Both ends of each side of each face as one number."""
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
-    keys: NDArray[np.int64] = ends.min(axis=1) << 32 | ends.max(axis=1)
-    return keys
-
-
-# --- between cutting and welding -----------------------------------------------------------------
-
-
-class _Seam(NamedTuple):
-    """Which vertices of a cut mesh belong together."""
-
-    place: Indices
-    """Shape (n,): the same for vertices to be welded."""
-    on_seam: Mask
-    """Shape (n,)."""
-
-
-def _simplify_cut(mesh: Mesh, seam: _Seam, *, locked: Mask, **options: Any) -> Simplification:
-    """Simplify with the seam locked, and with its neighbours too where that is not enough."""
-    result = simplify_arrays(*mesh, locked=locked | seam.on_seam, **options)
+def _contract_cut(
+    engine: Engine, mesh: Mesh, seam: Seam, *, locked: Mask, **more: Any
+) -> Simplification:
+    """Simplify with the seam locked, and where that is not enough with its neighbours too."""
+    result = contract(engine, mesh, locked=locked | seam.on_seam, **more)
     if not seam.on_seam.any():
         return result
-    before = _n_shared(mesh.faces, seam)
-    if _n_shared(result.faces, _followed(seam, result)) == before:
-        return result
-    ring = np.zeros(len(mesh.vertices), np.bool_)
-    ring[mesh.faces[seam.on_seam[mesh.faces].any(axis=1)]] = True
-    result = simplify_arrays(*mesh, locked=locked | ring, **options)
-    if _n_shared(result.faces, _followed(seam, result)) != before:
+    before, held = n_shared(mesh.faces, seam), locked | seam.on_seam
+    for n_left in reversed(range(MOST_ROUNDS)):
+        if n_shared(result.faces, followed(seam, result)) == before:
+            return result
+        met = clashes(mesh.faces, seam, result) if n_left else seam.on_seam
+        held[mesh.faces[met[mesh.faces].any(axis=1)]] = True
+        anew = Engine(mesh, engine.options, held, threads=engine.n_threads)
+        result = contract(anew, mesh, locked=held, **more)
+    if n_shared(result.faces, followed(seam, result)) != before:
         raise MeshError("the two sides of a seam cannot be simplified apart from each other")
     return result
 
 
-def _followed(seam: _Seam, result: Simplification) -> _Seam:
-    """The seam in the simplified mesh."""
-    new = result.vertex_map[seam.on_seam]
-    kept = new >= 0  # without faces a vertex is dropped even if it is locked
-    n_vertices = len(result.vertices)
-    place = len(seam.place) + np.arange(n_vertices, dtype=np.int32)
-    place[new[kept]] = seam.place[seam.on_seam][kept]
-    on_seam = np.zeros(n_vertices, np.bool_)
-    on_seam[new[kept]] = True
-    return _Seam(place, on_seam)
+def _manifold(mesh: Mesh) -> TopologyReport:
+    """The topology of a mesh that is to be cut, which could hide what is wrong with it."""
+    report = topology(*mesh)
+    if (defects := report.defects()) is not None:
+        raise MeshError(
+            f"the mesh is no consistently oriented 2-manifold: {defects}; repair=True repairs it"
+        )
+    return report
 
 
-def _n_shared(faces: Indices, seam: _Seam) -> tuple[int, int]:
-    """How many edges and faces at the seam become one with others when it is welded."""
-    near = faces[seam.on_seam[faces].any(axis=1)]
-    welded = seam.place[near]
-    n_distinct = len(np.unique(np.sort(welded, axis=1), axis=0))
-    return _n_edges(near) - _n_edges(welded), len(near) - n_distinct
+# --- what is asked for ---------------------------------------------------------------------------
 
 
-def _n_edges(faces: Indices) -> int:
-    """The number of edges, and none for those that join a vertex to itself."""
-    keys = np.unique(_edge_keys(faces))
-    return int((keys >> 32 != keys & 0xFFFFFFFF).sum())
+def _asked(
+    seams: ArrayLike | None,
+    mesh: Mesh,
+    of_vertices: Mapping[str, Array],
+    of_faces: Mapping[str, Array],
+    of_wedges: Mapping[str, Array],
+) -> Asked:
+    """Look up what `seams` names, or check the edges that it holds."""
+    nothing = np.empty((0, 2), np.int32)
+    if seams is None:
+        return Asked(nothing, [], [], False)
+    names = [seams] if isinstance(seams, str) else seams
+    if not isinstance(names, (list, tuple, set)) or not all(isinstance(x, str) for x in names):
+        return Asked(_as_edges(seams, mesh), [], [], False)
+    labels, wedges, copies = [], [], False
+    for name in sorted(names):
+        if name not in {*of_vertices, *of_faces, *of_wedges}:
+            given = ", ".join(repr(key) for key in (*of_faces, *of_vertices)) or "none"
+            raise OptionError(
+                f"seams={name!r} names no face_data and no vertex_data, given: {given}"
+            )
+        copies |= name in of_vertices
+        if name in of_faces and _is_at_corners(of_faces[name]):
+            wedges.append(name)
+        elif name in of_faces:
+            labels.append(_as_labels(name, of_faces[name]))
+    return Asked(nothing, labels, wedges, copies)
 
 
-# --- welding -------------------------------------------------------------------------------------
+def _is_at_corners(values: Array) -> bool:
+    """Whether face data have a value for each corner: texture coordinates, (m, 3, 2)."""
+    return values.ndim > 2 and values.shape[1] == 3
 
 
-def weld(mesh: Mesh, result: Simplification, origin: Indices) -> Simplification:
-    """Join the copies that a simplified mesh had when it was cut.
+def _as_labels(name: str, values: Array) -> Array:
+    """Labels of faces, checked."""
+    if values.dtype.kind not in "biuUS":
+        raise OptionError(
+            f"seams={name!r}: labels of faces must be integers, booleans or strings, or values at "
+            f"corners of shape (m, 3, ...), got {values.dtype} of shape {values.shape}"
+        )
+    return values
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh before it was cut.
-    result : Simplification
-        Of the cut mesh, with all vertices locked that were copied.
-    origin : ndarray, shape (n cut,), int32
-        See :class:`Cut`.
 
-    Returns
-    -------
-    Simplification
-        Of the mesh before it was cut: its maps and its report too.
-    """
-    n_copies = np.bincount(origin, minlength=len(mesh.vertices))
-    copied = np.flatnonzero((n_copies[origin] > 1) & (result.vertex_map >= 0))
-    twin = np.arange(len(result.vertices), dtype=np.int32)
-    first = np.full(len(mesh.vertices), -1, np.int32)
-    first[origin[copied[::-1]]] = result.vertex_map[copied[::-1]]
-    twin[result.vertex_map[copied]] = first[origin[copied]]
+def _as_edges(seams: Any, mesh: Mesh) -> Indices:
+    """Edges of a mesh, checked."""
+    pairs = np.asarray(seams)
+    if pairs.size == 0:
+        return np.empty((0, 2), np.int32)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
+        raise OptionError(
+            "seams must be names of face_data or vertex_data, or edges, integers of shape (k, 2); "
+            f"got {pairs.dtype} of shape {pairs.shape}"
+        )
+    last = len(mesh.vertices) - 1
+    if pairs.min() < 0 or pairs.max() > last:
+        raise OptionError(
+            f"seams must hold vertex indices from 0 to {last}, got {pairs.min()} to {pairs.max()}"
+        )
+    is_edge = np.isin(edge_keys(*np.sort(pairs, axis=1).T), _sides(mesh.faces)[1])
+    if not is_edge.all():
+        raise OptionError(f"seams must hold edges of the mesh, got {listed(pairs[~is_edge])}")
+    edges: Indices = pairs.astype(np.int32)
+    return edges
 
-    is_first = twin == np.arange(len(twin))
-    number = (np.cumsum(is_first, dtype=np.int32) - 1)[twin]
-    vertices, faces = result.vertices[is_first], number[result.faces]
-    vertex_map = np.append(number, np.int32(-1))[result.vertex_map[: len(mesh.vertices)]]
-    edges, kept = np.unique(
-        np.sort(number[result.report.remaining_edges], axis=1), axis=0, return_index=True
-    )
-    report = replace(
-        result.report,
-        topology_before=topology(*mesh),
-        topology_after=topology(vertices, faces),
-        remaining_edges=edges,
-        remaining_reasons=result.report.remaining_reasons[kept],
-    )
-    vertex_data = {name: values[is_first] for name, values in result.vertex_data.items()}
-    return Simplification(
-        vertices, faces, vertex_map, result.face_map, report, vertex_data, result.face_data
-    )
+
+def _sides(faces: Indices) -> tuple[Indices, NDArray[np.int64]]:
+    """The sides of all faces: both ends of each, the lower one first, and as one number."""
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    return ends, edge_keys(*ends.T)
 
 
 # --- repair, colours -----------------------------------------------------------------------------
+
+
+def _repaired(asked: Asked, repaired: Repaired) -> Asked:
+    """What is asked for, of the mesh when it is repaired."""
+    edges = asked.edges
+    if len(edges):
+        ends, _ = _sides(repaired.faces)
+        keys = edge_keys(*np.sort(repaired.vertex_origin[ends], axis=1).T)
+        edges = ends[np.isin(keys, edge_keys(*np.sort(edges, axis=1).T))]
+    return asked._replace(edges=edges, labels=[x[repaired.face_map] for x in asked.labels])
 
 
 def _turned(wedges: dict[str, Array], faces: Indices, repaired: Repaired) -> dict[str, Array]:
@@ -481,13 +327,9 @@ def _turned(wedges: dict[str, Array], faces: Indices, repaired: Repaired) -> dic
     return turned
 
 
-def _composed(result: Simplification, repaired: Repaired) -> Simplification:
-    """The maps from the mesh before it was repaired."""
-    return result._replace(
-        vertex_map=np.append(result.vertex_map, np.int32(-1))[repaired.vertex_map],
-        face_map=repaired.face_map[result.face_map],
-        report=replace(result.report, repairs=repaired.report),
-    )
+def _wedge(name: str) -> str:
+    """The key of wedge data among vertex data."""
+    return WEDGE + name
 
 
 def _colours(data: Mapping[str, Array]) -> set[str]:

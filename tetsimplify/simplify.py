@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from tetsimplify import adapters, kernels
+from tetsimplify import adapters
 from tetsimplify.arrays import as_data, as_mesh, as_vertex_mask
+from tetsimplify.contract import Clock, after_repair, contract
 from tetsimplify.engine import Engine
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.repair import repair as repair_mesh
-from tetsimplify.report import Simplification, SimplificationReport
-from tetsimplify.schedule import run
-from tetsimplify.topology import topology
-from tetsimplify.within import run_within
+from tetsimplify.report import Simplification
+from tetsimplify.seams import simplify as simplify_with_seams
 
 
 def simplify(
@@ -43,6 +39,7 @@ def simplify(
     shape: float | str | None = "auto",
     intersections: str = "allow",
     locked: ArrayLike | None = None,
+    seams: ArrayLike | str | Sequence[str] | None = None,
     repair: bool = False,
     vertex_data: Mapping[str, ArrayLike] | None = None,
     face_data: Mapping[str, ArrayLike] | None = None,
@@ -122,13 +119,25 @@ def simplify(
         With "prevent" no two faces come to cross that did not cross before, told exactly; slower.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
+    seams : array_like or str or sequence of str, optional
+        Borders that stay exactly as they are, with all their vertices and edges: edges as pairs
+        of vertex indices, shape (k, 2); or names of data. Of `face_data` with labels (integers,
+        booleans, strings): every edge between faces with different labels, so that each region
+        of a label keeps its topology too. Of `face_data` of shape (m, 3, ...), which are taken
+        as values at the corners of the faces, such as texture coordinates, and interpolated:
+        every edge on whose sides they differ. Of `vertex_data`: vertices on the boundary that
+        are in exactly the same place as others there, as programs have them that hold one
+        texture coordinate for each vertex; welded afterwards they give the topology that they
+        would have given before.
     repair : bool
         Repair a mesh that is no oriented 2-manifold first; see :func:`tetsimplify.repair`.
     vertex_data, face_data : mapping of names to arrays, optional
         Shapes (n, ...) and (m, ...). Floats at vertices are interpolated along contracted edges
         (at the foot of the new vertex on the edge, so that linear functions of the position stay
         exact where the new vertex is on the edge); all other types are labels, taken from the
-        nearer end of the edge and never averaged.
+        nearer end of the edge and never averaged. Floats of shape (n, 3) named ``"normal"`` or
+        ``"normals"``, in small letters or capitals, have unit length again where they were
+        interpolated.
     threads : int, optional
         None for as many as the process may use. The result does not depend on it.
     progress : callable, optional
@@ -147,7 +156,8 @@ def simplify(
         When the mesh is no consistently oriented 2-manifold, or not a mesh at all. The message
         says what is wrong where.
     OptionError
-        When an option has a wrong value, or no criterion is given.
+        When an option has a wrong value, no criterion is given, or `seams` holds what is no edge
+        and names no such data.
 
     Notes
     -----
@@ -201,19 +211,25 @@ def simplify(
         "shape": shape,
         "intersections": intersections,
     }
+    data: dict[str, Any] = {"vertex_data": vertex_data, "face_data": face_data}
+    more: dict[str, Any] = {
+        "locked": locked,
+        "repair": repair,
+        "threads": threads,
+        "progress": progress,
+    }
+    if seams is not None:
+        more["seams"] = seams
     if faces is None:
-        return adapters.simplify(
-            vertices,
-            locked=locked,
-            repair=repair,
-            vertex_data=vertex_data,
-            face_data=face_data,
-            threads=threads,
-            progress=progress,
-            **given_options,
+        return adapters.simplify(vertices, **data, **more, **given_options)
+    if seams is not None:
+        seamed = simplify_with_seams(
+            vertices, faces, copies=False, colours=(), **data, **more, **given_options
         )
-    clock = _Clock()
-    options = Options(**given_options)
+        of_faces = seamed.face_data | seamed.wedge_data
+        return Simplification(*seamed[:6], {name: of_faces[name] for name in face_data or {}})
+
+    clock, options = Clock(), Options(**given_options)
     with clock.stage("check"):
         given = as_mesh(vertices, faces)
         held = as_vertex_mask("locked", locked, len(given.vertices))
@@ -222,64 +238,17 @@ def simplify(
         repaired = repair_mesh(*given) if repair else None
         if repaired is not None:
             held = held[repaired.vertex_origin]
-            of_vertices = {k: data[repaired.vertex_origin] for k, data in of_vertices.items()}
+            of_vertices = {k: rows[repaired.vertex_origin] for k, rows in of_vertices.items()}
+            of_faces = {k: rows[repaired.face_map] for k, rows in of_faces.items()}
             given = Mesh(repaired.vertices, repaired.faces)
         engine = Engine(given, options, held, threads=threads)
-        shortest_before, _ = kernels.result.edge_extremes(given.vertices, given.faces.reshape(-1))
-
-    with clock.stage("contract"):
-        n_rounds = 1
-        if options.max_error is None:
-            run(engine, progress)
-        else:
-            engine, n_rounds = run_within(given, options, held, threads, progress)
-
-    with clock.stage("report"):
-        weights = engine.vertex_weights() if of_vertices else None
-        result = engine.result
-        vertex_map, face_map = result.vertex_map, result.face_map
-        if repaired is not None:
-            vertex_map = np.append(vertex_map, np.int32(-1))[repaired.vertex_map]
-            face_map = repaired.face_map[face_map]
-        after = topology(result.vertices, result.faces)
-
-    report = SimplificationReport(
-        options=options,
-        stop=result.stop,
-        n_simple=engine.tally("N_SIMPLE"),
-        n_nested=engine.tally("N_NESTED"),
-        n_lens_vertices=engine.tally("N_LENS_VERTICES"),
-        n_lens_faces=engine.tally("N_LENS_FACES"),
-        n_sweeps=engine.n_sweeps,
-        n_rounds=n_rounds,
-        seconds=clock.seconds,
-        topology_before=engine.topology_before,
-        topology_after=after,
-        shortest_edge_before=float(shortest_before),
-        shortest_edge_after=float(result.shortest_edge),
-        remaining_edges=result.remaining_edges,
-        remaining_reasons=result.remaining_reasons,
-        repairs=None if repaired is None else repaired.report,
+    result = contract(
+        engine,
+        given,
+        locked=held,
+        vertex_data=of_vertices,
+        face_data=of_faces,
+        progress=progress,
+        clock=clock,
     )
-    return Simplification(
-        result.vertices,
-        result.faces,
-        vertex_map,
-        face_map,
-        report,
-        {} if weights is None else weights.carry(of_vertices, result.vertex_map),
-        {name: data[face_map] for name, data in of_faces.items()},
-    )
-
-
-class _Clock:
-    """Adds up the seconds of named stages."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        yield
-        self.seconds[name] = time.perf_counter() - begin
+    return result if repaired is None else after_repair(result, repaired)

@@ -320,6 +320,57 @@ def test_custom_attributes(before_add):
     assert np.array_equal(corners, arrays.vertices[arrays.faces[ids, 0]])
 
 
+def test_custom_attributes_of_vertices_are_interpolated_when_asked_for():
+    ms = sphere()
+    mesh = ms.current_mesh()
+    n_vertices, n_faces = mesh.vertex_number(), mesh.face_number()
+    places = np.ascontiguousarray(mesh.vertex_matrix())
+    unset = np.full(n_vertices, np.nan)
+    mesh.add_vertex_custom_scalar_attribute(places @ (1.0, -2.0, 0.5) + 3.0, "line")
+    mesh.add_vertex_custom_point_attribute(places[:, ::-1] * 1e6, "turned")
+    mesh.add_vertex_custom_scalar_attribute(unset, "unset")
+    mesh.add_vertex_custom_scalar_attribute(np.full(n_vertices, 7.0), "same")
+    mesh.add_face_custom_scalar_attribute(np.arange(n_faces, dtype=float), "same")
+    ms.compute_new_custom_scalar_attribute_per_vertex(name="made", expr="x - y")
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH, customattributes=True)
+    vertices = mesh.vertex_matrix()
+    assert len(vertices) < n_vertices / 3
+    scalar = mesh.vertex_custom_scalar_attribute_array
+    np.testing.assert_allclose(scalar("line"), vertices @ (1.0, -2.0, 0.5) + 3.0, atol=1e-12)
+    np.testing.assert_allclose(scalar("made"), vertices @ (1.0, -1.0, 0.0), atol=1e-12)
+    turned = mesh.vertex_custom_point_attribute_matrix("turned")
+    np.testing.assert_allclose(turned, vertices[:, ::-1] * 1e6, atol=1e-6)
+    assert np.isnan(scalar("unset")).all() and (scalar("same") == 7.0).all()
+    ids = mesh.face_custom_scalar_attribute_array("same").astype(int)
+    assert len(np.unique(ids)) == mesh.face_number()
+    ms.compute_scalar_by_function_per_vertex(q="made")  # the mesh is whole
+
+
+@pytest.mark.parametrize("name", ["two words", "x", "1st", "z2"])
+def test_names_that_expressions_cannot_have(name):
+    ms = sphere()
+    mesh = ms.current_mesh()
+    n_vertices = mesh.vertex_number()
+    mesh.add_face_custom_scalar_attribute(np.zeros(mesh.face_number()), name)
+    message = message_of(lambda: ms.apply_filter(SIMPLIFY, customattributes=True))
+    assert repr(name.replace(" ", "_")) in message and mesh.vertex_number() == n_vertices
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    assert mesh.vertex_number() < n_vertices
+
+
+def test_selected_vertices_beside_texture_coordinates_of_vertices():
+    vertices, faces, _ = grid()
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces, v_tex_coords_matrix=1.0 - vertices[:, 1::-1]))
+    ms.compute_selection_by_condition_per_vertex(condselect="x < 0.5")
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH)
+    mesh = ms.current_mesh()
+    x, chosen = mesh.vertex_matrix()[:, 0], mesh.vertex_selection_array()
+    assert chosen.any() and x[chosen].max() < 0.6 and x[~chosen].min() > 0.4
+    uv = mesh.vertex_tex_coord_matrix()
+    np.testing.assert_allclose(uv, 1.0 - mesh.vertex_matrix()[:, 1::-1], atol=1e-6)
+
+
 def test_texture_seam_neither_tears_nor_bleeds(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # PyMeshLab writes the dummy texture there
     ms = textured_grid()
@@ -345,6 +396,7 @@ def test_wedges_beside_custom_attributes_of_faces():
     mesh.add_face_custom_scalar_attribute(np.arange(n_faces, dtype=float), "id")
     message = message_of(lambda: ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH))
     assert "per wedge" in message and mesh.face_number() == n_faces
+    assert "customattributes=True" in message
     new = plugin.simplify(mesh, max_edge_length=0.15, custom_attributes=["id"])
     ids = new.face_custom_scalar_attribute_array("id").astype(int)
     assert len(np.unique(ids)) == new.face_number() < n_faces / 3
@@ -352,6 +404,9 @@ def test_wedges_beside_custom_attributes_of_faces():
     uv = new.wedge_tex_coord_matrix().reshape(-1, 3, 2) - corners[:, :, :2]
     assert np.isin(np.round(uv[..., 0], 6), (0, 0.5)).all()
     assert np.abs(uv[..., 1]).max() < 1e-6
+    ms.apply_filter(SIMPLIFY, maxedgelength=LENGTH, customattributes=True)
+    assert np.array_equal(mesh.face_custom_scalar_attribute_array("id").astype(int), ids)
+    assert np.array_equal(mesh.wedge_tex_coord_matrix(), new.wedge_tex_coord_matrix())
 
 
 def test_borders_of_several_textures_stay(tmp_path):

@@ -177,6 +177,20 @@ def test_borders_of_materials_stay():
     np.testing.assert_array_equal(materials, result.triangles_center[:, 2] > 1.5)
 
 
+def test_borders_of_labels_stay_when_they_are_named():
+    mesh = textured_cylinder()
+    mesh.face_attributes["side"] = mesh.triangles_center[:, 1] > 0
+    border = {
+        tuple(p) for p in mesh.vertices[np.unique(mesh.faces[mesh.face_attributes["side"]])]
+    } & {tuple(p) for p in mesh.vertices[np.unique(mesh.faces[~mesh.face_attributes["side"]])]}
+    result = tetsimplify.simplify(mesh, max_edge_length=0.4, seams="side")
+    assert len(result.faces) < len(mesh.faces) / 2
+    assert border <= {tuple(p) for p in result.vertices}
+    assert merged_topology(result).same_topology(merged_topology(mesh))
+    free = tetsimplify.simplify(mesh, max_edge_length=0.4)
+    assert not border <= {tuple(p) for p in free.vertices}
+
+
 def test_copies_of_vertices_without_attributes_stay_together_too():
     """A box whose sides have vertices of their own, as for sharp edges."""
     pytest.importorskip("scipy")  # which trimesh subdivides with

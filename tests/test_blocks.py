@@ -1,0 +1,248 @@
+"""Blocks: threads that contract side by side, and what lies between them."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import meshes
+import models
+import naive
+import strategies
+import tetsimplify
+from test_simplify import assert_maps_fit, assert_same_topology
+from tetsimplify import blocks, kernels
+from tetsimplify.arrays import as_mesh
+from tetsimplify.engine import Engine
+from tetsimplify.kernels.corners import DEAD
+from tetsimplify.locality import by_locality
+from tetsimplify.options import Options
+
+OFF = {"foldover": None, "removal_limit": np.inf}
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    """Blocks of so few faces that small meshes have many."""
+    monkeypatch.setattr(blocks, "FACES", 120)
+    monkeypatch.setattr(blocks, "CELL", 30)
+    monkeypatch.setattr(blocks, "AT_ONCE", 4)
+    monkeypatch.setattr("tetsimplify.engine.LEAST_SPARE", 1)
+
+
+def grid_of_tubes(n=70):
+    """A surface with handles and holes all over, and boundaries at the sides of a box."""
+    return tetsimplify.extract_isosurface(models.gyroid(n), 0.0, spacing=(4 * np.pi / n,) * 3)
+
+
+def engine_of(mesh, **options):
+    vertices, faces = as_mesh(*mesh)
+    return Engine(as_mesh(vertices, faces), Options(**options), np.zeros(len(vertices), bool))
+
+
+# --- dividing -------------------------------------------------------------------------------------
+
+
+def blocks_of_edges(engine):
+    """The blocks at the ends of every edge, from the lists of faces of its vertices."""
+    faces = engine.mesh().faces
+    around = [set() for _ in range(len(engine._surface.vertices))]
+    place = engine._arranged.vertex_place
+    for face, block in zip(
+        faces, engine._surface.face_block[engine._surface.corner_vertex[::3] != DEAD], strict=True
+    ):
+        for v in place[face]:
+            around[v].add(int(block))
+    return around
+
+
+def test_every_face_is_in_one_block(small_blocks):
+    engine = engine_of(meshes.icosphere(3), max_edge_length=1.0)
+    for way in range(2):
+        engine.n_sweeps = way
+        divided = engine._divide()
+        assert len(divided) > 8
+        assert divided[0, 0] == 0 and divided[-1, 1] == engine.n_faces
+        assert (divided[1:, 0] == divided[:-1, 1]).all()
+        assert (divided[:-1, 1] - divided[:-1, 0] >= blocks.FACES).all()
+        listed = engine._listed[: engine.n_faces]
+        assert np.array_equal(np.sort(listed), np.arange(engine.n_faces))
+        for first, last, _, number in divided:
+            assert (engine._surface.face_block[listed[first:last]] == number).all()
+
+
+def test_what_lies_between_blocks_is_inside_of_those_of_the_other_way():
+    """Where both ways have a border no edge can be contracted: only few may be there."""
+    mesh = grid_of_tubes(80)
+    engine = engine_of(mesh, max_edge_length=1.0)
+    borders = []
+    for way in range(2):
+        engine.n_sweeps = way
+        engine._divide()
+        n_blocks = np.array([len(some) for some in blocks_of_edges(engine)])
+        borders.append(n_blocks > 1)
+    assert 0.02 < borders[0].mean() < 0.2
+    assert 0.02 < borders[1].mean() < 0.2
+    assert (borders[0] & borders[1]).mean() < 0.02
+
+
+def test_shuffled_meshes_are_put_in_order(small_blocks):
+    """Neighbours in memory are neighbours in space, and results keep the order given."""
+    rng = np.random.default_rng(0)
+    vertices, faces = meshes.icosphere(4)
+    place = rng.permutation(len(vertices))
+    shuffled = np.empty_like(vertices)
+    shuffled[place] = vertices
+    mesh = as_mesh(shuffled, place[faces][rng.permutation(len(faces))])
+    arranged = by_locality(mesh)
+    assert np.array_equal(mesh.vertices[arranged.vertex_origin], arranged.mesh.vertices)
+    assert np.array_equal(
+        arranged.vertex_origin[arranged.vertex_place], np.arange(len(mesh.vertices))
+    )
+    origin = arranged.vertex_origin[arranged.mesh.faces]
+    assert np.array_equal(origin, mesh.faces[arranged.face_origin])
+    a, b, _ = arranged.mesh.faces.T
+    assert np.median(np.abs(a - b)) < len(vertices) / 20 < np.median(np.abs(origin[:, 0] - b))
+    assert_maps_fit(*mesh, tetsimplify.simplify(*mesh, max_edge_length=0.3))
+
+
+# --- the promises ---------------------------------------------------------------------------------
+
+
+def same(one, two):
+    return (
+        one.vertices.tobytes() == two.vertices.tobytes()
+        and one.faces.tobytes() == two.faces.tobytes()
+        and one.vertex_map.tobytes() == two.vertex_map.tobytes()
+        and one.face_map.tobytes() == two.face_map.tobytes()
+        and one.report.stop == two.report.stop
+        and np.array_equal(one.report.remaining_edges, two.report.remaining_edges)
+        and np.array_equal(one.report.remaining_reasons, two.report.remaining_reasons)
+    )
+
+
+MODES = (
+    {"max_edge_length": 0.7},
+    {"keep_ratio": 0.1},
+    {"keep_ratio": 0.2, "cost": "length"},
+    {"max_quadric_error": 0.05},
+    {"keep_ratio": 0.3, "boundary": "keep", "feature_angle": 20.0},
+)
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: "-".join(mode))
+def test_threads_make_no_difference(small_blocks, mode):
+    vertices, faces = grid_of_tubes(24)
+    data = {"height": vertices[:, 2].copy(), "label": np.arange(len(vertices))}
+    run = lambda threads: tetsimplify.simplify(  # noqa: E731
+        vertices, faces, **mode, threads=threads, vertex_data=data
+    )
+    expected = run(1)
+    assert len(expected.faces) < 0.6 * len(faces)
+    for threads in (1, 2, 3, 8, None):
+        result = run(threads)
+        assert same(expected, result)
+        for name in data:
+            assert np.array_equal(expected.vertex_data[name], result.vertex_data[name])
+
+
+def test_runs_side_by_side_make_no_difference(small_blocks):
+    vertices, faces = grid_of_tubes(24)
+    expected = tetsimplify.simplify(vertices, faces, keep_ratio=0.1, threads=1)
+    with ThreadPoolExecutor(4) as pool:
+        results = pool.map(
+            lambda threads: tetsimplify.simplify(vertices, faces, keep_ratio=0.1, threads=threads),
+            (1, 2, 3, 1),
+        )
+        assert all(same(expected, result) for result in results)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_topology_is_kept_and_nothing_contractible_is_left(small_blocks, monkeypatch, seed):
+    monkeypatch.setattr(blocks, "FACES", 8)
+    monkeypatch.setattr(blocks, "CELL", 2)
+    vertices, faces = strategies.adversarial_mesh(seed)
+    result = tetsimplify.simplify(vertices, faces, max_edge_length=1e6, threads=2, **OFF)
+    assert_same_topology(faces, result)
+    assert_maps_fit(vertices, faces, result)
+    assert not naive.remaining_contractible(result.vertices, result.faces, 1e6)
+    for mode in MODES[1:4]:
+        result = tetsimplify.simplify(vertices, faces, threads=2, **mode)
+        assert_same_topology(faces, result)
+        least = math.ceil(mode.get("keep_ratio", 0.0) * len(faces))
+        assert len(result.faces) >= min(least, len(faces))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+def test_topology_is_kept_in_blocks_at_length(small_blocks, monkeypatch, block):
+    monkeypatch.setattr(blocks, "FACES", 8)
+    monkeypatch.setattr(blocks, "CELL", 2)
+    for seed in range(block, 4_000, 10):
+        vertices, faces = strategies.adversarial_mesh(seed)
+        result = tetsimplify.simplify(vertices, faces, max_edge_length=1e6, threads=2, **OFF)
+        assert_same_topology(faces, result)
+        assert not naive.remaining_contractible(result.vertices, result.faces, 1e6)
+
+
+def test_boundary_loops_across_blocks_keep_three_edges(small_blocks):
+    """Punched sheets, everything contracted that can be: loops of three edges are left."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        vertices, faces = meshes.grid(24, 24)
+        centres = vertices[faces].mean(axis=1)
+        holes = rng.uniform(2.0, 22.0, (5, 2))
+        is_hole = (np.linalg.norm(centres[:, None, :2] - holes, axis=2) < 2.2).any(axis=1)
+        repaired = tetsimplify.repair(vertices, faces[~is_hole])
+        mesh = repaired.vertices, repaired.faces
+        for mode in ({"max_edge_length": 1e6, **OFF}, {"target_faces": 1, "foldover": None}):
+            result = tetsimplify.simplify(*mesh, threads=2, **mode)
+            assert_same_topology(mesh[1], result)
+
+
+def test_invariants_after_every_sweep_over_blocks(small_blocks):
+    mesh = grid_of_tubes(24)
+    before = naive.summary(mesh.faces)
+    engine = engine_of(mesh, max_edge_length=1.0)
+    assert engine.is_divided
+    n_contracted = 0
+    for _ in range(6):
+        n_contracted += engine.sweep_divided()
+        surface, live = engine._surface, engine.mesh()
+        assert len(live.faces) == engine.n_faces
+        assert naive.has_same_topology(before, naive.summary(live.faces))
+        assert (surface.face_block == 0).all() and (surface.loop_home == 0).all()
+        sizes = np.zeros_like(surface.loop_size)
+        kernels.loops.count_loop_edges(surface.loop, surface.merged_into, sizes)
+        assert np.array_equal(surface.loop_size, sizes)
+        engine.compact_when_half()
+    assert n_contracted > 1000
+
+
+# --- seams ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", [{"max_edge_length": 0.2}, {"keep_ratio": 0.15}])
+def test_no_seams_are_left_between_blocks(mode, monkeypatch):
+    """Edges next to what was a border are as long as those inside."""
+    monkeypatch.setattr(blocks, "FACES", 512)
+    monkeypatch.setattr(blocks, "CELL", 128)
+    mesh = grid_of_tubes(80)
+    engine = engine_of(mesh, **mode)
+    engine._divide()
+    n_blocks = np.array([len(some) for some in blocks_of_edges(engine)])
+    was_border = n_blocks[engine._arranged.vertex_place] > 1
+    assert 0.1 < was_border.mean() < 0.4
+    result = tetsimplify.simplify(*mesh, **mode)
+    at_border = np.zeros(len(result.vertices), bool)
+    at_border[result.vertex_map[was_border]] = True
+    pairs = result.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    a, b = np.unique(np.sort(pairs, axis=1), axis=0).T
+    lengths = np.linalg.norm(result.vertices[a] - result.vertices[b], axis=1)
+    seam = at_border[a] & at_border[b]
+    inside = ~at_border[a] & ~at_border[b]
+    assert seam.sum() > 500 and inside.sum() > 500
+    for share in (0.05, 0.25, 0.5, 0.75, 0.95):
+        ratio = np.quantile(lengths[seam], share) / np.quantile(lengths[inside], share)
+        assert 0.85 < ratio < 1.18

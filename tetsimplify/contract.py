@@ -1,0 +1,101 @@
+"""One simplification of checked arrays: the engine runs, and what it did is told."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tetsimplify import kernels
+from tetsimplify.engine import Engine
+from tetsimplify.mesh import Mesh
+from tetsimplify.options import Progress
+from tetsimplify.report import Repaired, Simplification, SimplificationReport
+from tetsimplify.schedule import run
+from tetsimplify.topology import topology
+from tetsimplify.within import run_within
+
+Data = dict[str, NDArray[Any]]
+
+
+class Clock:
+    """Adds up the seconds of named stages."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count the time of a block."""
+        begin = time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+
+
+def contract(
+    engine: Engine,
+    mesh: Mesh,
+    *,
+    locked: NDArray[np.bool_],
+    vertex_data: Data,
+    face_data: Data,
+    progress: Progress | None,
+    clock: Clock,
+) -> Simplification:
+    """Contract edges of a mesh that an engine is made of; see :func:`tetsimplify.simplify`."""
+    options = engine.options
+    with clock.stage("check"):
+        shortest_before, _ = kernels.result.edge_extremes(mesh.vertices, mesh.faces.reshape(-1))
+
+    with clock.stage("contract"):
+        n_rounds = 1
+        if options.max_error is None:
+            run(engine, progress)
+        else:
+            engine, n_rounds = run_within(mesh, options, locked, engine.n_threads, progress)
+
+    with clock.stage("report"):
+        weights = engine.vertex_weights() if vertex_data else None
+        result = engine.result
+        after = topology(result.vertices, result.faces)
+
+    report = SimplificationReport(
+        options=options,
+        stop=result.stop,
+        n_simple=engine.tally("N_SIMPLE"),
+        n_nested=engine.tally("N_NESTED"),
+        n_lens_vertices=engine.tally("N_LENS_VERTICES"),
+        n_lens_faces=engine.tally("N_LENS_FACES"),
+        n_sweeps=engine.n_sweeps,
+        n_rounds=n_rounds,
+        seconds=clock.seconds,
+        topology_before=engine.topology_before,
+        topology_after=after,
+        shortest_edge_before=float(shortest_before),
+        shortest_edge_after=float(result.shortest_edge),
+        remaining_edges=result.remaining_edges,
+        remaining_reasons=result.remaining_reasons,
+    )
+    return Simplification(
+        result.vertices,
+        result.faces,
+        result.vertex_map,
+        result.face_map,
+        report,
+        {} if weights is None else weights.carry(vertex_data, result.vertex_map),
+        {name: data[result.face_map] for name, data in face_data.items()},
+    )
+
+
+def after_repair(result: Simplification, repaired: Repaired) -> Simplification:
+    """The result for the mesh before it was repaired: its maps lead back to that."""
+    return result._replace(
+        vertex_map=np.append(result.vertex_map, np.int32(-1))[repaired.vertex_map],
+        face_map=repaired.face_map[result.face_map],
+        report=replace(result.report, repairs=repaired.report),
+    )
