@@ -65,7 +65,7 @@ def test_import_loads_neither_numba_nor_a_host():
 
 def test_functions_are_not_hidden_by_their_modules():
     """``tetsimplify.simplify`` is the function however its module is loaded first."""
-    for name in ("simplify", "topology", "repair", "quality"):
+    for name in ("simplify", "topology", "repair", "quality", "compare"):
         code = f"import tetsimplify.{name}; import tetsimplify; print(callable(tetsimplify.{name}))"
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert run.stdout.strip() == "True"

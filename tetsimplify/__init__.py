@@ -1,5 +1,6 @@
 """Topology-preserving simplification of triangle surfaces."""
 
+from tetsimplify.compare import Comparison, compare
 from tetsimplify.distance import SurfaceDistance, surface_distance
 from tetsimplify.errors import (
     FileError,
@@ -21,6 +22,7 @@ from tetsimplify.topology import TopologyReport, topology
 __version__ = "0.1.0"
 
 __all__ = [
+    "Comparison",
     "FileError",
     "IntersectionReport",
     "Mesh",
@@ -35,6 +37,7 @@ __all__ = [
     "TetsimplifyError",
     "TopologyReport",
     "VolumeError",
+    "compare",
     "extract_isosurface",
     "quality",
     "repair",

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tetsimplify.io import Volume, isosurface_of, read_volume
 from tetsimplify.mesh import Mesh
 from tetsimplify.picture import Lens, Side, save_side_by_side
@@ -30,9 +28,7 @@ FRONTAL_LOBE = Lens((0.42, 0.47), 13.0)
 def brain_volume() -> Volume:
     """The average brain in mm: x from left to right, y from back to front, z upwards."""
     with as_file(files("tetsimplify") / "data" / VOLUME) as path:
-        z_y_x = read_volume(path)
-    assert z_y_x.spacing is not None
-    return Volume(z_y_x.data.T, np.diag([*z_y_x.spacing[::-1], 1.0]))
+        return read_volume(path, axes="zyx")
 
 
 def extract_brain(progress: Progress | None = None) -> Mesh:

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,8 @@ from rich.table import Table
 
 import tetsimplify
 from tetsimplify import Mesh
+from tetsimplify.decimators.method import version_of
+from tetsimplify.standard import METHODS, Goal, Method
 
 NAME = "tetsimplify"
 GYROID_PERIODS = 2
@@ -33,160 +34,42 @@ CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 
 @dataclass(frozen=True)
 class Tool:
-    """A simplifier: its package, and how it is prepared and run.
-
-    ``prepare(mesh)`` is not timed and gives what ``run(prepared, n_faces)`` takes, which is
-    timed; ``finish`` makes vertices and faces of its result.
-    """
+    """One of the methods of `tetsimplify.standard`, under its name in the tables here."""
 
     name: str
-    package: str
-    prepare: Callable[[Mesh], Any]
-    run: Callable[[Any, int], Any]
-    finish: Callable[[Any], tuple[Any, Any]] = lambda result: result
+    method: Method
+
+    @property
+    def package(self) -> str:
+        """The package that it is in."""
+        return self.method.packages[0]
 
     @property
     def is_installed(self) -> bool:
         """Whether its package can be found, without importing it."""
-        return version_of(self.package) is not None
+        return self.method.version is not None
 
+    def prepare(self, mesh: Mesh) -> Any:
+        """What `run` takes; not timed."""
+        return self.method.prepare(mesh, Goal())
 
-def version_of(package: str) -> str | None:
-    """Version of an installed package, None of others."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
+    def run(self, prepared: Any, n_faces: int) -> Any:
+        """Simplify; timed."""
+        return self.method.run(prepared, Goal(target_faces=n_faces))
 
-
-def prepare_meshoptimizer(mesh: Mesh) -> Any:
-    """Single precision and unsigned indices are all that it takes."""
-    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32).reshape(-1)
-
-
-def run_meshoptimizer(prepared: Any, n_faces: int) -> Any:
-    """Without a limit on the error, so that the number of faces decides."""
-    import meshoptimizer
-
-    vertices, indices = prepared
-    out = np.empty_like(indices)
-    n = meshoptimizer.simplify(
-        out, indices, vertices, target_index_count=3 * n_faces, target_error=1e9
-    )
-    return vertices, out[:n].reshape(-1, 3)
-
-
-def run_fast_simplification(mesh: Mesh, n_faces: int) -> Any:
-    """As it comes."""
-    import fast_simplification
-
-    return fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=n_faces, agg=7.0)
-
-
-def prepare_pyfqmr(mesh: Mesh) -> Any:
-    """Its object holds the mesh."""
-    import pyfqmr
-
-    simplifier = pyfqmr.Simplify()
-    simplifier.setMesh(mesh.vertices, mesh.faces)
-    return simplifier
-
-
-def run_pyfqmr(simplifier: Any, n_faces: int) -> Any:
-    """As it comes."""
-    simplifier.simplify_mesh(
-        target_count=n_faces, aggressiveness=7, preserve_border=False, verbose=False
-    )
-    return simplifier
-
-
-def prepare_pymeshlab(mesh: Mesh) -> Any:
-    """Its set holds the mesh."""
-    import pymeshlab
-
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
-    return meshes
-
-
-def run_pymeshlab(preserve_topology: bool) -> Callable[[Any, int], Any]:
-    """With every parameter given, since defaults are kept from the last dialog."""
-
-    def run(meshes: Any, n_faces: int) -> Any:
-        meshes.meshing_decimation_quadric_edge_collapse(
-            targetfacenum=n_faces,
-            targetperc=0.0,
-            qualitythr=0.3,
-            preserveboundary=False,
-            boundaryweight=1.0,
-            preservenormal=False,
-            preservetopology=preserve_topology,
-            optimalplacement=True,
-            planarquadric=False,
-            planarweight=0.001,
-            qualityweight=False,
-            autoclean=False,
-            selected=False,
-        )
-        return meshes
-
-    return run
-
-
-def finish_pymeshlab(meshes: Any) -> tuple[Any, Any]:
-    """Vertices and faces that are not deleted."""
-    mesh = meshes.current_mesh()
-    return mesh.vertex_matrix(), mesh.face_matrix()
-
-
-def prepare_vtk(mesh: Mesh) -> Any:
-    """Points stay double."""
-    import pyvista
-
-    return pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
-
-
-def run_vtk(method: str, **options: Any) -> Callable[[Any, int], Any]:
-    """One of the decimation filters of PyVista, which are those of VTK."""
-
-    def run(polydata: Any, n_faces: int) -> Any:
-        return getattr(polydata, method)(1.0 - n_faces / polydata.n_cells, **options)
-
-    return run
+    def finish(self, raw: Any) -> tuple[Any, Any]:
+        """Vertices and faces of the result; not timed."""
+        return self.method.finish(raw)
 
 
 TOOLS = (
-    Tool("meshoptimizer", "meshoptimizer", prepare_meshoptimizer, run_meshoptimizer),
-    Tool("fast-simplification", "fast-simplification", lambda mesh: mesh, run_fast_simplification),
-    Tool("pyfqmr", "pyfqmr", prepare_pyfqmr, run_pyfqmr, lambda tool: tool.getMesh()[:2]),
-    Tool(
-        "pymeshlab quadric",
-        "pymeshlab",
-        prepare_pymeshlab,
-        run_pymeshlab(False),
-        finish_pymeshlab,
-    ),
-    Tool(
-        "pymeshlab quadric, preservetopology",
-        "pymeshlab",
-        prepare_pymeshlab,
-        run_pymeshlab(True),
-        finish_pymeshlab,
-    ),
-    Tool(
-        "VTK quadric decimation",
-        "pyvista",
-        prepare_vtk,
-        run_vtk("decimate"),
-        lambda polydata: (polydata.points, polydata.regular_faces),
-    ),
-    Tool(
-        "VTK DecimatePro, preserve_topology",
-        "pyvista",
-        prepare_vtk,
-        run_vtk("decimate_pro", preserve_topology=True),
-        lambda polydata: (polydata.points, polydata.regular_faces),
-    ),
+    Tool("meshoptimizer", METHODS["meshoptimizer"]),
+    Tool("fast-simplification", METHODS["fast-simplification"]),
+    Tool("pyfqmr", METHODS["pyfqmr"]),
+    Tool("pymeshlab quadric", METHODS["pymeshlab-quadric"]),
+    Tool("pymeshlab quadric, preservetopology", METHODS["pymeshlab-topology"]),
+    Tool("VTK quadric decimation", METHODS["vtk-quadric"]),
+    Tool("VTK DecimatePro, preserve_topology", METHODS["vtk-pro-topology"]),
 )
 
 

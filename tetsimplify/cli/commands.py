@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from tetsimplify import __version__
-from tetsimplify.cli import tables, values
+from tetsimplify.cli import compare, tables, values
 from tetsimplify.cli.session import Session, session
 from tetsimplify.cli.wanted import Wanted, diagonal, median_edge
 from tetsimplify.edges import edge_lengths
@@ -70,7 +70,25 @@ Normals = Annotated[
 ]
 Key = Annotated[
     str | None,
-    typer.Option(help="Array to take from .npz or .vti.", rich_help_panel=VOLUME_OPTIONS),
+    typer.Option(
+        help="What to take of a file that holds several: array, path, level, image, series.",
+        rich_help_panel=VOLUME_OPTIONS,
+    ),
+]
+Channel = Annotated[
+    int | None,
+    typer.Option(help="Which channel to take, from 0.", rich_help_panel=VOLUME_OPTIONS),
+]
+Time = Annotated[
+    int | None, typer.Option(help="Which time to take, from 0.", rich_help_panel=VOLUME_OPTIONS)
+]
+Axes = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LETTERS",
+        help="What the axes of an array are, where its file does not tell: zyx, tzcyx.",
+        rich_help_panel=VOLUME_OPTIONS,
+    ),
 ]
 Spacing = Annotated[
     str | None,
@@ -91,6 +109,9 @@ def isosurface(
     lattice: Lattice = None,
     normals: Normals = None,
     key: Key = None,
+    channel: Channel = None,
+    time: Time = None,
+    axes: Axes = None,
     spacing: Spacing = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -100,7 +121,8 @@ def isosurface(
     with session("isosurface", as_json=as_json, quiet=quiet, debug=debug) as this:
         check_target(output)
         options = {"lattice": lattice, "normals": normals, "closed": closed or None}
-        mesh = _extract(this, volume, level, key, spacing, options)
+        chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
+        mesh = _extract(this, volume, level, chosen, spacing, options)
         found = _topology(this, mesh)
         _write(this, output, mesh)
         this.finish(
@@ -249,6 +271,9 @@ def simplify(
     lattice: Lattice = None,
     normals: Normals = None,
     key: Key = None,
+    channel: Channel = None,
+    time: Time = None,
+    axes: Axes = None,
     spacing: Spacing = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -280,7 +305,8 @@ def simplify(
             }
         )
         volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
-        mesh = _read(this, source, level, key, spacing, volume_options)
+        chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
+        mesh = _read(this, source, level, chosen, spacing, volume_options)
         result = _simplify(this, mesh, repair=repair, **wanted.options(mesh))
         _write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
@@ -415,6 +441,9 @@ def demo(
         )
 
 
+compare.register(app)
+
+
 def _header(this: Session, source: Path | str) -> dict[str, Any]:
     made = {"command": this.command, "version": __version__, "input": source}
     return {**made, "outputs": this.written} if this.written else made
@@ -428,7 +457,7 @@ def _read(
     this: Session,
     source: Path,
     level: float | None,
-    key: str | None,
+    chosen: dict[str, Any],
     spacing: str | None,
     options: dict[str, Any],
 ) -> Mesh:
@@ -436,12 +465,12 @@ def _read(
     if is_volume_file(source):
         if level is None:
             raise OptionError(f"{source} is a volume, so --level is needed")
-        return _extract(this, source, level, key, spacing, options)
+        return _extract(this, source, level, chosen, spacing, options)
     if not is_mesh_file(source):
         raise FileError(
             f"{source} has no known suffix; meshes have {MESH_SUFFIXES}, volumes {VOLUME_SUFFIXES}"
         )
-    given = {"level": level, "key": key, "spacing": spacing, **options}
+    given = {"level": level, **chosen, "spacing": spacing, **options}
     if wrong := [f"--{name}" for name, value in given.items() if value is not None]:
         raise OptionError(f"{', '.join(wrong)}: only for volumes, and {source} is a mesh")
     with this.stage("read"):
@@ -452,21 +481,21 @@ def _extract(
     this: Session,
     path: Path,
     level: float,
-    key: str | None,
+    chosen: dict[str, Any],
     spacing: str | None,
     options: dict[str, Any],
 ) -> Mesh:
     """Extract a surface from a volume, and explain when there is none."""
     distances = None if spacing is None else values.parse_spacing(spacing)
     with this.stage("read"):
-        volume: Volume = read_volume(path, key=key)
+        volume: Volume = read_volume(path, **chosen)
     if distances is not None:
         volume = volume.with_spacing(distances)
     given = {name: value for name, value in options.items() if value is not None}
     with this.stage("extract"):
         mesh = isosurface_of(volume, level, progress=this.progress, **given)
     if not len(mesh.faces):
-        low, high = volume.data.min(), volume.data.max()
+        low, high = volume.value_range()
         raise VolumeError(
             f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
         )

@@ -5,6 +5,7 @@ Each format is one short module here; :data:`~tetsimplify.io.meshes.MESH_FORMATS
 a format needs are imported when a file of that format is met.
 """
 
+from tetsimplify.io.lazy import LazyArray
 from tetsimplify.io.meshes import MESH_FORMATS, check_target, is_mesh_file, read_mesh, write_mesh
 from tetsimplify.io.volume import Volume
 from tetsimplify.io.volumes import VOLUME_FORMATS, is_volume_file, isosurface_of, read_volume
@@ -12,6 +13,7 @@ from tetsimplify.io.volumes import VOLUME_FORMATS, is_volume_file, isosurface_of
 __all__ = [
     "MESH_FORMATS",
     "VOLUME_FORMATS",
+    "LazyArray",
     "Volume",
     "check_target",
     "is_mesh_file",

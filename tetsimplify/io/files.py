@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
 import shutil
@@ -9,7 +10,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tetsimplify.errors import FileError, MissingExtraError
+from tetsimplify.errors import FileError, MissingExtraError, OptionError
+
+log = logging.getLogger("tetsimplify.io")
 
 
 def suffix_among(path: str | os.PathLike[str], suffixes: Iterable[str]) -> str | None:
@@ -19,24 +22,30 @@ def suffix_among(path: str | os.PathLike[str], suffixes: Iterable[str]) -> str |
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(path: Path, *, folders: bool = False) -> Iterator[None]:
     """Make every failure to read a file a FileError that names the file.
 
     Raises
     ------
     FileError
-        When there is no such file, or whatever else is wrong with it.
+        When there is no such file, when it is a folder and `folders` are not taken, or
+        whatever else is wrong with it.
     """
     if not path.exists():
         raise FileError(f"there is no file {path}")
-    if not path.is_file():
+    if not path.is_file() and not folders:
         raise FileError(f"{path} is not a file")
     try:
         yield
-    except (MissingExtraError, MemoryError):
+    except (MissingExtraError, OptionError, MemoryError):
         raise
     except Exception as error:
         raise FileError(f"cannot read {path}: {in_one_line(error)}") from error
+
+
+def log_whole(path: Path) -> None:
+    """Tell that a volume is read whole, since it cannot be read in parts."""
+    log.info("%s cannot be read in parts, so all of it is read into memory", path.name)
 
 
 def in_one_line(error: Exception) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tetsimplify.arrays import as_triple
 from tetsimplify.errors import FileError
+from tetsimplify.io.lazy import SLAB_BYTES, LazyArray
 
 
 class Volume(NamedTuple):
@@ -17,14 +18,17 @@ class Volume(NamedTuple):
 
     Attributes
     ----------
-    data : ndarray, shape (n0, n1, n2), dtype and memory order of the file
-        Samples; a memory map where the format allows it.
+    data : ndarray or LazyArray, shape (n0, n1, n2), dtype and memory order of the file
+        Samples: an array, a memory map of the file, or what reads the file when it is sliced.
     affine : ndarray, shape (4, 4), float64
         ``world = affine @ (index0, index1, index2, 1)``.
+    unit : str or None
+        Of lengths in the world, such as ``"mm"`` or ``"µm"``, where the file tells it.
     """
 
-    data: NDArray[Any]
+    data: NDArray[Any] | LazyArray
     affine: NDArray[np.float64]
+    unit: str | None = None
 
     @property
     def spacing(self) -> tuple[float, float, float] | None:
@@ -47,7 +51,32 @@ class Volume(NamedTuple):
         lengths = np.linalg.norm(self.affine[:3, :3], axis=0)
         affine = self.affine.copy()
         affine[:3, :3] *= as_triple("spacing", spacing, positive=True) / lengths
-        return Volume(self.data, affine)
+        return Volume(self.data, affine, self.unit)
+
+    def slowest_first(self) -> Volume:
+        """The same samples with their axes in the order of the file, the slowest first.
+
+        Slices along the first axis are then read in one piece. Nothing is copied.
+        """
+        if isinstance(self.data, LazyArray):
+            order = np.argsort(self.data.order)
+        else:
+            order = np.argsort([-abs(stride) for stride in self.data.strides], kind="stable")
+        if (order == (0, 1, 2)).all():
+            return self
+        return Volume(self.data.transpose(order.tolist()), self.affine[:, [*order, 3]], self.unit)
+
+    def value_range(self) -> tuple[Any, Any]:
+        """The least and the greatest value, NaN aside, read slab by slab."""
+        data = self.slowest_first().data
+        plane_bytes = data.dtype.itemsize * data.shape[1] * data.shape[2]
+        at_once = max(1, SLAB_BYTES // max(1, plane_bytes))
+        ends = []
+        for begin in range(0, data.shape[0], at_once):
+            slab = np.asarray(data[begin : begin + at_once])
+            ends.append((np.fmin.reduce(slab, axis=None), np.fmax.reduce(slab, axis=None)))
+        lows, highs = zip(*ends, strict=True)
+        return np.fmin.reduce(lows), np.fmax.reduce(highs)
 
 
 def _as_tuple(values: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -81,8 +110,10 @@ def affine_of(
     return affine
 
 
-def checked_volume(data: Any, affine: NDArray[np.float64], axes: str | None = None) -> Volume:
-    """Drop axes of length 1 beyond the third and refuse what is no volume of real numbers.
+def checked_volume(
+    data: NDArray[Any] | LazyArray, affine: NDArray[np.float64], unit: str | None = None
+) -> Volume:
+    """Refuse what is no volume of real numbers.
 
     Raises
     ------
@@ -90,13 +121,10 @@ def checked_volume(data: Any, affine: NDArray[np.float64], axes: str | None = No
         When the array has not three axes or holds no real numbers, or when the transform is
         singular.
     """
-    while data.ndim > 3 and data.shape[-1] == 1:
-        data = data[..., 0]
     if data.ndim != 3:
-        named = f" ({axes})" if axes else ""
-        raise FileError(f"its array has shape {data.shape}{named}, but a volume has three axes")
+        raise FileError(f"its array has shape {data.shape}, but a volume has three axes")
     if data.dtype.kind not in "biuf":
         raise FileError(f"its array holds {data.dtype}, but a volume holds real numbers")
     if not np.isfinite(affine).all() or np.linalg.det(affine[:3, :3]) == 0:
         raise FileError(f"its transform to the world cannot be inverted: {affine.tolist()}")
-    return Volume(data, affine)
+    return Volume(data, affine, unit)

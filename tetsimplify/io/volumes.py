@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify.errors import FileError, OptionError
-from tetsimplify.io import metaimage, nifti, nrrd, numpy_files, tiff, vti
+from tetsimplify.io import dicom, hdf5, metaimage, nifti, nrrd, numpy_files, ome_zarr, tiff, vti
+from tetsimplify.io.axes import Choice
 from tetsimplify.io.files import reading, suffix_among
 from tetsimplify.io.volume import Volume
 from tetsimplify.mesh import Mesh
@@ -21,72 +22,141 @@ class VolumeFormat(NamedTuple):
     """A file format of volumes; `has_keys` tells whether a file may hold several arrays."""
 
     name: str
-    read: Callable[[Path, str | None], Volume]
+    read: Callable[[Path, Choice], Volume]
     has_keys: bool = False
 
 
+NIFTI = VolumeFormat("NIfTI", nifti.read)
+NRRD = VolumeFormat("NRRD", nrrd.read)
+METAIMAGE = VolumeFormat("MetaImage", metaimage.read)
+TIFF = VolumeFormat("TIFF stack", tiff.read, has_keys=True)
+TIFF_FOLDER = VolumeFormat("folder of TIFF files", tiff.read_folder)
+DICOM = VolumeFormat("DICOM series", dicom.read, has_keys=True)
+HDF5 = VolumeFormat("HDF5", hdf5.read, has_keys=True)
+ZARR = VolumeFormat("Zarr", ome_zarr.read, has_keys=True)
+
 VOLUME_FORMATS = {
-    ".nii": VolumeFormat("NIfTI", nifti.read),
-    ".nii.gz": VolumeFormat("NIfTI", nifti.read),
-    ".nrrd": VolumeFormat("NRRD", nrrd.read),
-    ".nhdr": VolumeFormat("NRRD", nrrd.read),
-    ".mha": VolumeFormat("MetaImage", metaimage.read),
-    ".mhd": VolumeFormat("MetaImage", metaimage.read),
-    ".tif": VolumeFormat("TIFF stack", tiff.read),
-    ".tiff": VolumeFormat("TIFF stack", tiff.read),
+    ".nii": NIFTI,
+    ".nii.gz": NIFTI,
+    ".mgh": VolumeFormat("MGH of FreeSurfer", nifti.read),
+    ".mgz": VolumeFormat("MGH of FreeSurfer", nifti.read),
+    ".dcm": DICOM,
+    ".nrrd": NRRD,
+    ".nhdr": NRRD,
+    ".mha": METAIMAGE,
+    ".mhd": METAIMAGE,
+    ".tif": TIFF,
+    ".tiff": TIFF,
     ".npy": VolumeFormat("NumPy array", numpy_files.read_npy),
     ".npz": VolumeFormat("NumPy archive", numpy_files.read_npz, has_keys=True),
+    ".h5": HDF5,
+    ".hdf5": HDF5,
+    ".zarr": ZARR,
     ".vti": VolumeFormat("VTK ImageData", vti.read, has_keys=True),
+    ".vtk": VolumeFormat("VTK structured points", vti.read_legacy, has_keys=True),
 }
+ZARR_METADATA = ("zarr.json", ".zgroup", ".zarray")
 
 
-def read_volume(path: str | os.PathLike[str], *, key: str | None = None) -> Volume:
-    """Read a voxel volume from a file.
+def read_volume(
+    path: str | os.PathLike[str],
+    *,
+    key: str | None = None,
+    channel: int | None = None,
+    time: int | None = None,
+    axes: str | None = None,
+) -> Volume:
+    """Open a voxel volume.
 
-    Samples keep the data type of the file. The transform to the world is that of the file,
-    in the convention of its format: NIfTI has right, anterior, superior; MetaImage left,
-    posterior, superior; NRRD what its header says. Axes are x, y, z, except in .npy and
-    .npz, whose axes may mean anything and are taken in their order.
+    Samples keep the data type of the file and stay in the file until they are sliced, where
+    its format allows that; where it does not, that is logged. The transform to the world is
+    that of the file, in the convention of its format: NIfTI has right, anterior, superior;
+    DICOM and MetaImage left, posterior, superior; NRRD what its header says. Axes come as x, y,
+    z. Where a file does not name its axes they are taken as x, y, z in their order.
 
     Parameters
     ----------
     path : path-like
-        An .npy or .npz file; with the extra ``volumes`` also .nii, .nii.gz, .nrrd, .nhdr,
-        .mha, .mhd, .tif and .tiff; with the extra ``pyvista`` also .vti.
+        A file, or a folder of DICOM or TIFF files or a Zarr store. What may follow after a
+        colon is the key: ``"a.h5:/raw"``, ``"a.zarr:1"``. Suffixes are the keys of
+        ``VOLUME_FORMATS``; DICOM files need none. NumPy's need no extra, VTK's the extra
+        ``pyvista``, all else ``volumes``.
     key : str, optional
-        The array to take from a file that holds several (.npz, .vti).
+        What to take from a file that holds several: the name or path of an array (NPZ, VTK,
+        HDF5, Zarr), the level of an OME-Zarr image, the number of an image (TIFF), the UID of
+        a DICOM series.
+    channel, time : int, optional
+        Which one to take of several channels (components, colours) or times, from 0.
+    axes : str, optional
+        What the axes are, in the order of the file: ``"zyx"``, ``"tzcyx"``. For files that do
+        not tell, such as .npy.
 
     Returns
     -------
     Volume
-        Samples and transform. Samples are a memory map where the format allows it: .npy,
-        and uncompressed .nii and .tif.
+        Samples, transform and unit of length.
 
     Raises
     ------
     FileError
-        When the file is missing, cannot be read, has an unknown suffix, or holds no volume
-        or several.
+        When the file is missing, cannot be read, is of no known format, or holds no volume or
+        several of which none was chosen. Slicing raises it too, as that reads the file.
     OptionError
-        When `key` is given for a format without keys.
+        When `key` is given for a format without keys, or when there is no such channel or time,
+        or when `axes` do not fit.
     MissingExtraError
         When the format needs a package that is not installed.
     """
-    path = Path(path)
-    suffix = suffix_among(path, VOLUME_FORMATS)
-    if suffix is None:
+    path, key_in_path = _split_key(path)
+    if None not in (key, key_in_path):
+        raise OptionError(f"there are two keys, {key_in_path!r} in the path and {key!r}")
+    key = key_in_path if key is None else key
+    if not path.exists():
+        raise FileError(f"there is no file {path}")
+    volume_format = _format_of(path)
+    if volume_format is None:
         known = " ".join(VOLUME_FORMATS)
         raise FileError(f"{path} has no suffix of a volume format; these are known: {known}")
-    volume_format = VOLUME_FORMATS[suffix]
     if key is not None and not volume_format.has_keys:
-        raise OptionError(f"a {suffix} file holds one array, so there is no key {key!r}")
-    with reading(path):
-        return volume_format.read(path, key)
+        raise OptionError(f"a {volume_format.name} holds one array, so there is no key {key!r}")
+    with reading(path, folders=volume_format in (DICOM, TIFF_FOLDER, ZARR)):
+        return volume_format.read(path, Choice(key, channel, time, axes))
 
 
 def is_volume_file(path: str | os.PathLike[str]) -> bool:
-    """Whether the suffix is one of the volume formats."""
-    return suffix_among(path, VOLUME_FORMATS) is not None
+    """Whether a path leads to a volume, by its suffix or by what is there."""
+    return _format_of(_split_key(path)[0]) is not None
+
+
+def _split_key(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
+    """Take ``file.h5:/raw`` apart, unless there is a file of just this name."""
+    text = os.fspath(path)
+    if not os.path.exists(text):
+        for suffix, volume_format in VOLUME_FORMATS.items():
+            end = text.lower().find(f"{suffix}:") + len(suffix)
+            if volume_format.has_keys and len(suffix) <= end < len(text) - 1:
+                return Path(text[:end]), text[end + 1 :]
+    return Path(text), None
+
+
+def _format_of(path: Path) -> VolumeFormat | None:
+    suffix = suffix_among(path, VOLUME_FORMATS)
+    if path.is_dir():
+        return _format_of_folder(path)
+    if suffix == ".vtk" and not (path.is_file() and vti.is_image(path)):
+        return None  # it holds a surface
+    if suffix is None and path.is_file() and dicom.is_dicom(path):
+        return DICOM
+    return None if suffix is None else VOLUME_FORMATS[suffix]
+
+
+def _format_of_folder(path: Path) -> VolumeFormat:
+    names = [name.name for name in path.iterdir()]
+    if any(name in ZARR_METADATA for name in names) or path.suffix.lower() == ".zarr":
+        return ZARR
+    if any(suffix_among(name, tiff.SUFFIXES) for name in names):
+        return TIFF_FOLDER
+    return DICOM
 
 
 def isosurface_of(
@@ -104,7 +174,7 @@ def isosurface_of(
     ----------
     volume : Volume
         Samples and their transform to the world. The cubes are taken along the axis that
-        is slowest in memory, so that a memory map is read once from start to end.
+        is slowest in the file, so that a file is read once from start to end.
     level, lattice, closed, normals, progress
         See :func:`tetsimplify.extract_isosurface`.
 
@@ -121,9 +191,7 @@ def isosurface_of(
     """
     from tetsimplify.isosurface import extract_isosurface
 
-    data, affine = volume
-    if data.flags.f_contiguous and not data.flags.c_contiguous:
-        data, affine = data.T, affine[:, [2, 1, 0, 3]]
+    data, affine, _ = volume.slowest_first()
     mesh = extract_isosurface(
         data, level, lattice=lattice, closed=closed, normals=normals, progress=progress
     )
