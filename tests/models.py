@@ -1,14 +1,13 @@
 """Volumes whose surfaces are known, and a slow and obvious marching tetrahedra to compare with.
 
-The slow one takes any list of tetrahedra, so that lattices can be tried that the package does not
-have. A surface vertex is the lattice edge that it lies on, a pair of lattice points; nothing is
-numbered and nothing is shared with the package.
+The slow one takes any list of tetrahedra; see `naive_lattices`. A surface vertex is the lattice
+edge that it lies on, a pair of lattice points; nothing is numbered and nothing is shared with the
+package.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,56 +60,7 @@ def gyroid(n: int, periods: float = 2.0) -> NDArray[np.float64]:
     return np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
 
 
-# ---------------------------------------------------------------------------- lattices
-
-
-def kuhn_tetrahedra(shape: Sequence[int]) -> Iterator[tuple[Point, ...]]:
-    """Six tetrahedra a cube: the shortest paths from its first corner to its last."""
-    for corner in product(*(range(n - 1) for n in shape)):
-        for order in permutations(range(3)):
-            at = list(corner)
-            path = [corner]
-            for axis in order:
-                at[axis] += 1
-                path.append(tuple(at))
-            yield tuple(path)
-
-
-def body_centred_tetrahedra(shape: Sequence[int]) -> Iterator[tuple[Point, ...]]:
-    """Four tetrahedra around every face between two cubes (Chan and Purisima 1998).
-
-    Each joins the two centres to an edge of the face. Coordinates are twice those of the cubes:
-    corners are even, centres are odd.
-    """
-    for corner in product(*(range(1, 2 * n - 2, 2) for n in shape)):
-        for axis in range(3):
-            if corner[axis] + 2 > 2 * shape[axis] - 3:
-                continue
-            other = moved(corner, axis, 2)
-            middle = moved(corner, axis, 1)
-            b, c = (axis + 1) % 3, (axis + 2) % 3
-            around = [
-                moved(moved(middle, b, db), c, dc)
-                for db, dc in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-            ]
-            for k in range(4):
-                yield (corner, other, around[k], around[(k + 1) % 4])
-
-
-def moved(point: Point, axis: int, by: int) -> Point:
-    """Return a lattice point moved along an axis."""
-    there = list(point)
-    there[axis] += by
-    return (there[0], there[1], there[2])
-
-
 # ---------------------------------------------------------------------------- marching
-
-
-def as_samples(volume: ArrayLike) -> dict[Point, float]:
-    """Map the indices of a volume to its samples."""
-    array = np.asarray(volume)
-    return {index: float(array[index]) for index in np.ndindex(*array.shape)}
 
 
 def marching_tetrahedra(
@@ -153,15 +103,6 @@ def position(samples: Mapping[Point, float], level: float, edge: LatticeEdge) ->
     t = (level / 2 - samples[p] / 2) / (samples[q] / 2 - samples[p] / 2)
     t = min(max(t, CLEARANCE), 1 - CLEARANCE)
     return np.array(p) + t * np.subtract(q, p)
-
-
-def numbered(faces: Sequence[LatticeFace]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return a mesh with the vertices in the middles of their lattice edges."""
-    edges = sorted({edge for face in faces for edge in face})
-    number = {edge: vi for vi, edge in enumerate(edges)}
-    vertices = np.array([np.mean(edge, axis=0) for edge in edges]).reshape(-1, 3)
-    triangles = np.array([[number[edge] for edge in face] for face in faces], dtype=np.int64)
-    return vertices, triangles.reshape(-1, 3)
 
 
 # ---------------------------------------------------------------------------- the interpolant

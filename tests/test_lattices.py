@@ -1,39 +1,66 @@
-"""Lattices as data: they fill the cube, neighbours match, and the tables follow from them."""
+"""Lattices as data: they fill the volume, cubes match, and the tables follow from them."""
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
+from collections import Counter
+from itertools import combinations, pairwise, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-import naive
+import naive_lattices
 from tetsimplify import OptionError
-from tetsimplify.lattices import LATTICES, Lattice, lattice_tables
+from tetsimplify.lattices import LATTICES, Lattice, lattice_named
+from tetsimplify.tables import (
+    FIRST,
+    LAST,
+    LAST_CUBE,
+    N_PLACES,
+    PARITY,
+    SITES,
+    Tables,
+    lattice_tables,
+)
 
-CORNERS = np.array([(c >> 2 & 1, c >> 1 & 1, c & 1) for c in range(8)])
-SIDES = [(axis, high) for axis in range(3) for high in range(2)]
+SHAPES = [(2, 2, 2), (2, 3, 4), (4, 2, 3), (3, 3, 5)]
+Point = tuple[int, int, int]  # twice the coordinates in the volume
 
 every_lattice = pytest.mark.parametrize("lattice", LATTICES.values(), ids=lambda found: found.name)
+every_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
 
 
-def faces_of_tetrahedra(lattice: Lattice) -> list[frozenset[int]]:
-    return [frozenset(f) for t in lattice.tetrahedra for f in combinations(t, 3)]
+def bits_of_place(index: int, n: int) -> int:
+    return FIRST * (index == 0) + LAST_CUBE * (index == n - 2) + LAST * (index == n - 1)
 
 
-def in_side(corners: frozenset[int], axis: int, high: int) -> bool:
-    return all(CORNERS[corner][axis] == high for corner in corners)
+def place_of(site: tuple[int, ...], shape: tuple[int, ...]) -> int:
+    bits = (bits_of_place(site[axis], shape[axis]) << 3 * axis for axis in range(3))
+    return sum(bits) + PARITY * (sum(site) % 2)
 
 
-def slot_corners(name: str, row: np.ndarray) -> tuple[int, int]:
-    """The two corners of the cube, or one twice, that a triangle corner of the tables stands on."""
-    anchor, slot = row
-    low, high = lattice_tables(name).slot_ends[slot]
-    return int(anchor | low), int(anchor | high)
+def point_at(site: tuple[int, ...], point: int) -> Point:
+    corner = SITES[point]
+    offset = corner >> 2 & 1, corner >> 1 & 1, corner & 1
+    z, y, x = (2 * (i + d) + (point >= 8) for i, d in zip(site, offset, strict=True))
+    return z, y, x
 
 
-def as_colouring(*inside: int) -> int:
-    return sum(1 << corner for corner in inside)
+def tetrahedra(lattice: Lattice, shape: tuple[int, int, int]) -> list[tuple[Point, ...]]:
+    """Those of the data, in a volume."""
+    found = []
+    for cube in naive_lattices.cubes(shape):
+        for piece in lattice.pieces:
+            sides = [
+                (a, h) for a, h in product(range(3), range(2)) if cube[a] == h * (shape[a] - 2)
+            ]
+            if (
+                piece.parity in (None, sum(cube) % 2)
+                and (piece.at_side is None or divmod(piece.at_side, 2) in sides)
+                and (piece.away_from_side is None or divmod(piece.away_from_side, 2) not in sides)
+            ):
+                found += [tuple(point_at(cube, p) for p in t) for t in piece.tetrahedra]
+    return found
 
 
 # ---------------------------------------------------------------------------- the tetrahedra
@@ -42,129 +69,176 @@ def as_colouring(*inside: int) -> int:
 @every_lattice
 def test_names_are_keys_and_all_is_described(lattice: Lattice):
     assert LATTICES[lattice.name] is lattice
+    assert lattice_named(lattice.name) is lattice
     assert lattice.description
 
 
 @every_lattice
-def test_tetrahedra_fill_the_cube(lattice: Lattice):
-    volumes = [
-        abs(np.linalg.det(CORNERS[list(t[1:])] - CORNERS[t[0]])) / 6 for t in lattice.tetrahedra
-    ]
-    assert min(volumes) > 0
-    assert sum(volumes) == pytest.approx(1)
+@every_shape
+def test_tetrahedra_are_those_written_down_slowly(lattice: Lattice, shape: Point):
+    slow = Counter(frozenset(t) for t in naive_lattices.LATTICES[lattice.name](shape))
+    assert Counter(frozenset(t) for t in tetrahedra(lattice, shape)) == slow
 
 
 @every_lattice
-def test_every_face_is_shared_by_two_tetrahedra_or_lies_in_a_side(lattice: Lattice):
-    found = faces_of_tetrahedra(lattice)
-    for face in set(found):
-        on_sides = sum(in_side(face, axis, high) for axis, high in SIDES)
-        assert found.count(face) == 2 - on_sides
+@every_shape
+def test_tetrahedra_fill_the_volume(lattice: Lattice, shape: Point):
+    found = np.array(tetrahedra(lattice, shape)) / 2
+    volumes = np.abs(np.linalg.det(found[:, 1:] - found[:, :1])) / 6
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(np.prod(np.subtract(shape, 1)))
 
 
 @every_lattice
-@pytest.mark.parametrize("axis", range(3))
-def test_opposite_sides_match_when_cubes_are_stacked(lattice: Lattice, axis: int):
-    step = 4 >> axis
-    found = set(faces_of_tetrahedra(lattice))
-    low = {face for face in found if in_side(face, axis, 0)}
-    high = {face for face in found if in_side(face, axis, 1)}
-    assert {frozenset(corner | step for corner in face) for face in low} == high
+@every_shape
+def test_every_face_is_shared_by_two_tetrahedra_or_lies_in_a_side(lattice: Lattice, shape: Point):
+    found = Counter(frozenset(f) for t in tetrahedra(lattice, shape) for f in combinations(t, 3))
+    for face, count in found.items():
+        points = np.array(list(face))
+        in_side = (
+            (points == 0).all(axis=0) | (points == 2 * np.array(shape) - 2).all(axis=0)
+        ).any()
+        assert count == 2 - in_side
 
 
 def test_kuhn_tetrahedra_run_around_the_main_diagonal():
-    tetrahedra = LATTICES["kuhn"].tetrahedra
-    assert len(tetrahedra) == 6
-    assert all(t[0] == 0 and t[3] == 7 for t in tetrahedra)
-    assert all(a & b == a for t in tetrahedra for a, b in pairwise(t))
+    (piece,) = LATTICES["kuhn"].pieces
+    assert len(piece.tetrahedra) == 6
+    assert all(t[0] == 0 and t[3] == 7 for t in piece.tetrahedra)
+    assert all(a & b == a for t in piece.tetrahedra for a, b in pairwise(t))
+
+
+def test_five_tetrahedra_of_two_kinds():
+    for piece in LATTICES["five"].pieces:
+        found = np.array([[point_at((0, 0, 0), p) for p in t] for t in piece.tetrahedra]) / 2
+        volumes = np.abs(np.linalg.det(found[:, 1:] - found[:, :1])) / 6
+        np.testing.assert_allclose(sorted(volumes), [1 / 6] * 4 + [1 / 3])
+
+
+def test_body_centred_tetrahedra_are_alike():
+    """Four edges of length sqrt(3) / 2 and two of length 1: all equal, but on the sides."""
+    for piece in LATTICES["bcc"].pieces:
+        for t in piece.tetrahedra if piece.at_side is None else ():
+            points = np.array([point_at((0, 0, 0), p) for p in t]) / 2
+            lengths = sorted(float(np.linalg.norm(p - q)) for p, q in combinations(points, 2))
+            np.testing.assert_allclose(lengths, [np.sqrt(0.75)] * 4 + [1] * 2)
+
+
+def row_of(lattice: Lattice) -> str:
+    """The row of a lattice in the table of the page on isosurfaces."""
+    inner = [p for p in lattice.pieces if p.at_side is None and p.parity in (None, 0)]
+    n_tetrahedra = sum(len(piece.tetrahedra) for piece in inner)
+    n_edges = int(lattice_tables(lattice.name).exists[0]).bit_count()
+    has = ["yes" if answer else "no" for answer in (lattice.is_alike, lattice.has_centres)]
+    columns = [f"`{lattice.name}`", n_tetrahedra, n_edges, *has, lattice.description]
+    return f"| {' | '.join(map(str, columns))} |"
+
+
+def test_the_page_says_what_lattices_support():
+    page = Path(__file__).parents[1] / "docs" / "isosurface.md"
+    assert "\n".join(map(row_of, LATTICES.values())) in page.read_text(encoding="utf-8")
+
+
+def test_what_lattices_support():
+    has = {name: (entry.has_centres, entry.is_alike) for name, entry in LATTICES.items()}
+    assert has == {"kuhn": (False, True), "five": (False, False), "bcc": (True, True)}
 
 
 # ---------------------------------------------------------------------------- the tables
 
 
 @every_lattice
-def test_slots_are_all_edges_once_and_the_lattice_point(lattice: Lattice):
+@every_shape
+def test_every_edge_has_one_site_and_slot(lattice: Lattice, shape: Point):
     tables = lattice_tables(lattice.name)
-    ends = [tuple(row) for row in tables.slot_ends.tolist()]
-    assert ends[0] == (0, 0)
-    assert len(set(ends)) == len(ends)
-    assert all(a & b == 0 for a, b in ends), "a slot is relative to the lowest corner of its box"
-    edges = {tuple(sorted(e)) for t in lattice.tetrahedra for e in combinations(t, 2)}
-    assert {(a & ~(a & b), b & ~(a & b)) for a, b in edges} == set(ends[1:])
+    found = []
+    for site in np.ndindex(*shape):
+        exists = int(tables.exists[place_of(site, shape)])
+        for slot, (a, b) in enumerate(tables.slot_ends.tolist()):
+            if exists >> slot & 1:
+                found.append(frozenset((point_at(site, a), point_at(site, b))))
+    assert len(set(found)) == len(found)
+    edges = {frozenset(e) for t in tetrahedra(lattice, shape) for e in combinations(t, 2)}
+    assert set(found) == edges
 
 
-def test_kuhn_has_seven_edges_a_cube():
-    assert len(lattice_tables("kuhn").slot_ends) == 1 + 7
+def test_edges_of_each_inner_site():
+    per_site = {name: int(lattice_tables(name).exists[0]).bit_count() for name in LATTICES}
+    assert per_site == {"kuhn": 7, "five": 6, "bcc": 14}
 
 
 @every_lattice
-@pytest.mark.parametrize("colouring", range(256))
-def test_triangles_stand_on_edges_from_inside_to_outside(lattice: Lattice, colouring: int):
-    tables = lattice_tables(lattice.name)
-    expected = 0
-    for tetrahedron in lattice.tetrahedra:
-        n_inside = sum(colouring >> corner & 1 for corner in tetrahedron)
-        expected += {0: 0, 1: 1, 2: 2, 3: 1, 4: 0}[n_inside]
-    triangles = tables.triangles[tables.first[colouring] : tables.first[colouring + 1]]
-    assert len(triangles) == expected
-    for row in triangles.reshape(-1, 2):
-        a, b = slot_corners(lattice.name, row)
-        assert (colouring >> a & 1) != (colouring >> b & 1)
+@pytest.mark.parametrize("closed", [False, True])
+def test_lattice_points_are_vertices_on_the_sides_of_closed_surfaces(
+    lattice: Lattice, closed: bool
+):
+    tables = lattice_tables(lattice.name, closed)
+    on_side = np.arange(N_PLACES) & (FIRST | LAST) * (1 | 8 | 64) != 0
+    np.testing.assert_array_equal(tables.exists & 1, on_side & closed)
+
+
+def corners_of(tables: Tables, triangle: np.ndarray) -> list[tuple[Point, Point]]:
+    """The ends of the lattice edges that a triangle of the tables stands on."""
+    ends = []
+    for corner, slot in triangle.tolist():
+        site = corner >> 2 & 1, corner >> 1 & 1, corner & 1
+        a, b = tables.slot_ends[slot].tolist()
+        ends.append((point_at(site, a), point_at(site, b)))
+    return ends
 
 
 @every_lattice
-@pytest.mark.parametrize("colouring", range(256))
-def test_surface_and_caps_of_one_cube_are_closed(lattice: Lattice, colouring: int):
+def test_triangles_stand_on_edges_from_inside_to_outside(lattice: Lattice):
     tables = lattice_tables(lattice.name)
-    pieces = [tables.triangles[tables.first[colouring] : tables.first[colouring + 1]]]
-    for first in tables.cap_first:
-        pieces.append(tables.cap_triangles[first[colouring] : first[colouring + 1]])
-    corners = [slot_corners(lattice.name, row) for row in np.concatenate(pieces).reshape(-1, 2)]
-    number = {corner: vi for vi, corner in enumerate(sorted(set(corners)))}
-    faces = np.array([number[corner] for corner in corners]).reshape(-1, 3)
-    found = naive.summary(faces)
-    assert found.is_sound
-    assert found.is_closed
-    assert (len(faces) == 0) == (colouring == 0)
-    # where it is inside, and nowhere else, the cap covers a side
-    for (axis, high), piece in zip(SIDES, pieces[1:], strict=True):
-        ends = [slot_corners(lattice.name, row) for row in piece.reshape(-1, 2)]
-        assert all(in_side(frozenset(end), axis, high) for end in ends)
-        inside = {corner for corner in range(8) if colouring >> corner & 1}
-        inside &= {corner for corner in range(8) if CORNERS[corner][axis] == high}
-        assert inside == {a for a, b in ends if a == b}
-
-
-@every_lattice
-def test_no_triangle_where_nothing_crosses(lattice: Lattice):
-    tables = lattice_tables(lattice.name)
-    assert tables.first[0] == tables.first[1] == 0
-    assert tables.first[255] == tables.first[256] == len(tables.triangles)
-
-
-@every_lattice
-def test_full_cube_has_caps_over_all_six_sides(lattice: Lattice):
-    tables = lattice_tables(lattice.name)
-    full = as_colouring(*range(8))
-    per_side = tables.cap_first[:, full + 1] - tables.cap_first[:, full]
-    assert per_side.tolist() == [2] * 6
+    points = {point_at((0, 0, 0), p): p for p in range(12)}
+    rng = np.random.default_rng(0)
+    for part, piece in enumerate(lattice.pieces):
+        n_colourings = tables.crossing.size
+        for colouring in rng.permutation(n_colourings)[:300].tolist():
+            expected = 0
+            for tetrahedron in piece.tetrahedra:
+                n_inside = sum(colouring >> point & 1 for point in tetrahedron)
+                expected += {0: 0, 1: 1, 2: 2, 3: 1, 4: 0}[n_inside]
+            begin, end = tables.rows[part, colouring]
+            assert end - begin == expected
+            for triangle in tables.triangles[begin:end]:
+                for p, q in corners_of(tables, triangle):
+                    assert (colouring >> points[p] & 1) != (colouring >> points[q] & 1)
 
 
 @every_lattice
 def test_complement_has_the_same_triangles_turned_over(lattice: Lattice):
     tables = lattice_tables(lattice.name)
+    everything = tables.crossing.size - 1
 
-    def turned(colouring: int, turn: int) -> set[tuple]:
-        rows = tables.triangles[tables.first[colouring] : tables.first[colouring + 1]]
+    def turned(part: int, colouring: int, turn: int) -> set[tuple]:
+        begin, end = tables.rows[part, colouring]
         faces = []
-        for triangle in rows.tolist():
+        for triangle in tables.triangles[begin:end].tolist():
             corners = [tuple(corner) for corner in triangle[::turn]]
             start = corners.index(min(corners))
             faces.append(tuple(corners[start:] + corners[:start]))
         return set(faces)
 
-    for colouring in range(256):
-        assert turned(colouring, 1) == turned(255 - colouring, -1)
+    for part in range(len(lattice.pieces)):
+        for colouring in range(0, everything + 1, 7):
+            assert turned(part, colouring, 1) == turned(part, everything - colouring, -1)
+
+
+@every_lattice
+def test_no_triangle_where_nothing_crosses(lattice: Lattice):
+    tables = lattice_tables(lattice.name)
+    for colouring in (0, tables.crossing.size - 1):
+        assert (tables.rows[:, colouring, 0] == tables.rows[:, colouring, 1]).all()
+
+
+@every_lattice
+def test_full_cube_has_caps_over_all_six_sides(lattice: Lattice):
+    tables = lattice_tables(lattice.name, closed=True)
+    place = (FIRST | LAST_CUBE) * (1 | 8 | 64)
+    parts = tables.parts[tables.first_part[place] : tables.first_part[place + 1]]
+    counts = tables.rows[parts, -1, 1] - tables.rows[parts, -1, 0]
+    assert counts.sum() == 6 * 2
 
 
 @every_lattice

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 import meshes
 import models
 import naive
+import naive_lattices
 import strategies
 from meshes import Mesh
 from tetsimplify import extract_isosurface, simplify, topology
@@ -320,23 +321,15 @@ def common_counts(faces: ArrayLike) -> Counter[tuple[int, int]]:
     )
 
 
-def tetrahedra_of(name: str, shape: tuple[int, int, int]) -> list[tuple[models.Point, ...]]:
-    """The tetrahedra of a lattice of the package in a volume."""
-    return [
-        tuple((z + (c >> 2 & 1), y + (c >> 1 & 1), x + (c & 1)) for c in tetrahedron)
-        for z, y, x in product(*(range(n - 1) for n in shape))
-        for tetrahedron in LATTICES[name].tetrahedra
-    ]
-
-
 LATTICE_TETRAHEDRA = {
-    **{name: tetrahedra_of(name, (4, 4, 4)) for name in LATTICES},
-    "body-centred": list(models.body_centred_tetrahedra((6, 6, 6))),
+    (name, shape): list(cut(shape))
+    for name, cut in naive_lattices.LATTICES.items()
+    for shape in product((2, 3, 4), repeat=3)
 }
 
 
-@pytest.mark.parametrize("name", LATTICE_TETRAHEDRA)
-def test_lattices_are_flag_complexes(name: str):
+@pytest.mark.parametrize("name", LATTICE_TETRAHEDRA, ids=str)
+def test_lattices_are_flag_complexes(name: tuple[str, models.Point]):
     found = LATTICE_TETRAHEDRA[name]
     simplices = {frozenset(s) for t in found for k in (2, 3, 4) for s in combinations(t, k)}
     near: dict[models.Point, set[models.Point]] = defaultdict(set)
@@ -351,8 +344,15 @@ def test_lattices_are_flag_complexes(name: str):
                 assert frozenset((p, q, r, s)) in simplices
 
 
+TWO_CUBES = [
+    (2, 2, 3),
+    pytest.param((2, 3, 2), marks=pytest.mark.slow),
+    pytest.param((3, 2, 2), marks=pytest.mark.slow),
+]
+
+
 @pytest.mark.parametrize("lattice", LATTICES)
-@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 3, 2), (3, 2, 2)])
+@pytest.mark.parametrize("shape", TWO_CUBES)
 def test_theorem_3_on_all_patterns_of_a_block(lattice: str, shape: tuple[int, int, int]):
     total: Counter[tuple[int, int]] = Counter()
     for pattern in range(2**12):
@@ -361,6 +361,17 @@ def test_theorem_3_on_all_patterns_of_a_block(lattice: str, shape: tuple[int, in
     assert total.keys() == {(2, 2), (1, 1)}
     if lattice == "kuhn":
         assert total == {(2, 2): 61_440, (1, 1): 61_440}
+
+
+@pytest.mark.parametrize("shape", TWO_CUBES)
+def test_theorem_3_on_all_patterns_of_two_cubes_and_their_centres(shape: tuple[int, int, int]):
+    total: Counter[tuple[int, int]] = Counter()
+    for pattern in range(2**14):
+        bits = (pattern >> np.arange(14) & 1).astype(np.uint8)
+        volume, centres = bits[:12].reshape(shape), bits[12:].reshape(np.subtract(shape, 1))
+        mesh = extract_isosurface(volume, 0.5, lattice="bcc", centres=centres, threads=1)
+        total += common_counts(mesh.faces)
+    assert total.keys() == {(2, 2), (1, 1)}
 
 
 def check_theorem_3(seed: int, shape: tuple[int, int, int], lattice: str) -> None:
@@ -385,16 +396,6 @@ def test_theorem_3_on_random_volumes(seed: int, lattice: str):
 @pytest.mark.parametrize("seed", range(25, 1000))
 def test_theorem_3_on_random_volumes_at_length(seed: int, lattice: str):
     check_theorem_3(seed, (8, 7, 6), lattice)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_theorem_3_on_the_body_centred_lattice(seed: int):
-    found = LATTICE_TETRAHEDRA["body-centred"]
-    rng = np.random.default_rng(seed)
-    samples = {p: float(rng.random()) for t in found for p in t}
-    faces = models.numbered(models.marching_tetrahedra(samples, found, 0.5))[1]
-    assert naive.summary(faces).is_sound
-    assert common_counts(faces).keys() == {(2, 2), (1, 1)}
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -445,11 +446,14 @@ def section_of_a_body_centred_lattice() -> tuple[Mesh, dict[models.LatticeEdge, 
                  | /   \ |         four corners of the face between the two cubes.
                  v-------u
     """
-    found = list(models.body_centred_tetrahedra((4, 4, 4)))
-    samples = {p: 0.0 for t in found for p in t} | {(3, 3, 3): 1.0}
-    surface = models.marching_tetrahedra(samples, found, 0.5)
-    edges = sorted({edge for face in surface for edge in face})
-    return models.numbered(surface), {edge: vi for vi, edge in enumerate(edges)}
+    centres = np.zeros((3, 3, 3))
+    centres[1, 1, 1] = 1.0
+    mesh = extract_isosurface(np.zeros((4, 4, 4)), 0.5, lattice="bcc", centres=centres)
+    number = {}
+    for vi, point in enumerate(4 * mesh.vertices):  # in the middle of its lattice edge
+        other = tuple((point - CENTRE).round().astype(int).tolist())
+        number[models.as_lattice_edge(CENTRE, other)] = vi
+    return (mesh.vertices, mesh.faces), number
 
 
 CENTRE, ABOVE = (3, 3, 3), (3, 3, 5)

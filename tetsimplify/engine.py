@@ -227,6 +227,7 @@ class Engine:
         progress: Progress | None = None,
         done: float = 0.0,
         *,
+        lenience: float = 1.0,
         divided: bool = False,
     ) -> int:
         """Sweep with each threshold in turn, and contract edges that cost less.
@@ -238,6 +239,8 @@ class Engine:
         progress : callable, optional
         done : float
             What to tell it.
+        lenience : float
+            So many times the threshold an edge may cost where it makes triangles worse.
         divided : bool
             Sweep over blocks. Each of them may lose its share of the faces that may go.
 
@@ -250,7 +253,7 @@ class Engine:
 
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
             bundles = surface, self._quadrics, self._watch, scratch, self.rules
-            lists = self._cost, thresholds, self._listed
+            lists = self._cost, thresholds, lenience, self._listed
             return int(kernels.sweep.sweep_ranked(*bundles, *lists, some))
 
         if divided:
@@ -265,6 +268,7 @@ class Engine:
             if progress is not None:
                 progress("contract", done)
         self._scratch.point[kernels.state.MAX_COST] = thresholds[-1]
+        self._scratch.point[kernels.state.MAX_PRICE] = lenience * thresholds[-1]
         self.n_sweeps += 1
         return n_contracted + self._unblock_deferred()
 

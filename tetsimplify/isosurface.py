@@ -1,36 +1,77 @@
-"""Isosurfaces of voxel volumes by marching tetrahedra."""
+"""Isosurfaces of voxel volumes and functions by marching tetrahedra."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from tetsimplify import kernels
-from tetsimplify.arrays import MAX_CORNERS, as_triple, as_volume
+from tetsimplify.arrays import as_triple, as_volume
 from tetsimplify.errors import OptionError, VolumeError
-from tetsimplify.lattices import Tables, lattice_tables
+from tetsimplify.lattices import LATTICES, lattice_named
+from tetsimplify.levels import as_levels
+from tetsimplify.march import Block, March, Rows, blocks
 from tetsimplify.mesh import Mesh
+from tetsimplify.planes import Planes, as_sliceable
+from tetsimplify.regularise import regular
+from tetsimplify.sampling import Function, SampledFunction, sampled
+from tetsimplify.tables import lattice_tables
+from tetsimplify.vertex_data import VertexData, as_fields
+from tetsimplify.workers import Workers
 
 Progress = Callable[[str, float], object]
 
-BYTES_READ_AT_ONCE = 2**24  # of float64 samples; a few planes of a volume in any memory order
-GROWTH = 1.25  # of the arrays of the result: at most a quarter of them is to spare
+
+class Isosurface(Mesh):
+    """The mesh of an isosurface, and what is known of its vertices.
+
+    It is a pair of `vertices` and `faces`, as every :class:`~tetsimplify.Mesh`.
+
+    Attributes
+    ----------
+    level : float
+        The value at the surface.
+    vertex_data : dict of str to ndarray, shape (n,) or (n, 3), float64
+        What was asked for: ``"normals"``, and values of other volumes by their names.
+    """
+
+    level: float
+    vertex_data: dict[str, NDArray[np.float64]]
+
+    def __new__(
+        cls,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        level: float = 0.0,
+        vertex_data: Mapping[str, NDArray[np.float64]] | None = None,
+    ) -> Isosurface:
+        """Make one of its parts."""
+        self = super().__new__(cls, vertices, faces)
+        self.level = level
+        self.vertex_data = dict(vertex_data or {})
+        return self
 
 
 def extract_isosurface(
-    volume: Any,
-    level: float,
+    volume: ArrayLike | Function,
+    level: float | str | Sequence[float | str],
     *,
     spacing: Sequence[float] = (1.0, 1.0, 1.0),
     origin: Sequence[float] = (0.0, 0.0, 0.0),
+    bounds: Sequence[Sequence[float]] | None = None,
+    shape: int | Sequence[int] | None = None,
     lattice: str = "kuhn",
+    centres: Any = None,
     closed: bool = False,
     normals: str = "lower",
+    regularise: bool = False,
+    vertex_normals: bool = False,
+    vertex_data: Mapping[str, Any] | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
-) -> Mesh:
+) -> Any:
     """Extract the surface where a volume has the value `level`.
 
     The surface is a 2-manifold, consistently oriented, with boundary only on the sides of
@@ -38,31 +79,53 @@ def extract_isosurface(
 
     Parameters
     ----------
-    volume : array_like, shape (n0, n1, n2), any real dtype
-        Samples, at least two along each axis; in any memory order.
-    level : float
-        The iso-value. Samples equal to it count as outside.
+    volume : array_like, shape (n0, n1, n2), any real dtype, or callable
+        Samples, at least two along each axis; in any memory order. Anything with ``shape``,
+        ``dtype`` and slices along the first axis is read a few planes at a time, each once. Or a
+        function of three arrays of coordinates, which is sampled as `bounds` and `shape` say.
+    level : float, "otsu", or a list of these
+        The iso-value. Samples equal to it count as outside. "otsu" parts the samples into two
+        classes of least variance, and reads the volume twice for that.
     spacing : three floats
         Distance between samples along the three axes, in the units that you want.
     origin : three floats
         Position of sample (0, 0, 0).
-    lattice : str
+    bounds : three pairs of floats
+        For a function, the least and the greatest coordinate along each axis.
+    shape : int or three ints
+        For a function, the number of samples along each axis.
+    lattice : {"kuhn", "five", "bcc"}
         How cubes are cut into tetrahedra; see :data:`tetsimplify.lattices.LATTICES`.
+    centres : array_like, shape (n0 - 1, n1 - 1, n2 - 1), optional
+        Values in the middle of the cubes, for a lattice that has points there ("bcc"). If not
+        given these are the means of the eight corners, or the values of the function.
     closed : bool
         Close the surface with caps on the sides of the volume where these are inside.
     normals : {"lower", "higher"}
         The side that normals point to. With "lower" the solid is where values are above the
         level, with "higher" where they are below.
+    regularise : bool
+        Contract vertices that are near the same lattice point where that keeps the topology:
+        regularised marching tetrahedra (Treece, Prager and Gee 1999).
+    vertex_normals : bool
+        Make unit normals at the vertices from the gradient of the volume, to be found as
+        ``vertex_data["normals"]`` of the result.
+    vertex_data : dict of str to array_like, shape (n0, n1, n2), optional
+        Other volumes of the same shape, whose values at the vertices are wanted.
+    threads : int, optional
+        How many threads to use; all cores that the process may use if not given. The result
+        is the same for any number.
     progress : callable, optional
         Called as ``progress("isosurface", done)`` with `done` from 0 to 1. Raise from it to
         cancel.
 
     Returns
     -------
-    Mesh
-        Vertices at ``origin + spacing * index``, coordinates in the order of the axes of the
-        volume, which are taken as right-handed; faces in memory order, neighbours near each
-        other. Empty when nothing crosses the level.
+    Isosurface, or list of Isosurface
+        A :class:`~tetsimplify.Mesh` with its `level` and `vertex_data`; a list of them, in the
+        same order, when `level` is a list. Vertices at ``origin + spacing * index``, coordinates
+        in the order of the axes of the volume, which are taken as right-handed; faces in memory
+        order, neighbours near each other. Empty when nothing crosses the level.
 
     Raises
     ------
@@ -82,6 +145,12 @@ def extract_isosurface(
     A. Doi and A. Koide. An efficient method of triangulating equi-valued surfaces by using
     tetrahedral cells. IEICE Trans. Inform. Systems E74-D(1), 1991, 214-224.
 
+    G. M. Treece, R. W. Prager and A. H. Gee. Regularised marching tetrahedra: improved iso-surface
+    extraction. Computers & Graphics 23(4), 1999, 583-598, doi:10.1016/S0097-8493(99)00076-X.
+
+    S. L. Chan and E. O. Purisima. A new tetrahedral tesselation scheme for isosurface generation.
+    Computers & Graphics 22(1), 1998, 83-90, doi:10.1016/S0097-8493(97)00085-X.
+
     Examples
     --------
     >>> import numpy as np
@@ -90,186 +159,90 @@ def extract_isosurface(
     >>> mesh = tetsimplify.extract_isosurface(0.8 - np.sqrt(x**2 + y**2 + z**2), 0.0)
     >>> tetsimplify.topology(*mesh).euler_characteristic
     2
+
+    >>> ball = lambda x, y, z: 1 - x**2 - y**2 - z**2
+    >>> mesh = tetsimplify.extract_isosurface(ball, 0.0, bounds=[(-2, 2)] * 3, shape=20)
+    >>> bool(abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.02)
+    True
     """
-    samples = as_volume(volume)
-    tables = lattice_tables(lattice)
-    frame = (as_triple("spacing", spacing, positive=True), as_triple("origin", origin))
-    if np.shape(level) or np.asarray(level).dtype.kind not in "biuf" or not np.isfinite(level):
-        raise OptionError(f"level must be a finite number, got {level!r}")
+    has_centres = lattice_named(lattice).has_centres
+    frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
+    source: Any = volume
+    if callable(volume) and not hasattr(volume, "shape"):
+        source, frame = _as_samples(volume, bounds, shape, frame)
+        if has_centres and centres is None:
+            centres = source.centres()
+    elif bounds is not None or shape is not None:
+        raise OptionError("bounds and shape are for functions; a volume has spacing and origin")
+    samples = as_volume(source)
+    middles = _as_centres(centres, samples.shape, lattice)
+    fields = as_fields(vertex_data, samples.shape, vertex_normals)
     if normals not in ("lower", "higher"):
         raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
 
-    march = _March(samples.shape, float(level), frame, tables, closed)
-    for plane in _planes(samples, float(level), above=normals == "lower"):
-        march.add(plane)
+    with Workers(threads) as workers:
+        levels = as_levels(level, samples)
+        planes, tables = Planes(samples), lattice_tables(lattice, closed)
+        data = VertexData(fields, vertex_normals, workers)
+        is_traced = data.is_wanted or regularise
+        marches = [
+            March(planes, one, normals == "lower", frame, tables, workers, is_traced)
+            for one in levels
+        ]
+        rows = [data.rows() for _ in marches]
+        for block in blocks(planes, middles, tables, workers, int(vertex_normals)):
+            of_fields = data.take(block)
+            for k, march in enumerate(marches):
+                tell = _telling(progress, block, k, len(marches))
+                is_new = march.add(block, tell)
+                data.add(block, of_fields, march, is_new, rows[k])
+    surfaces = [_finished(*pair, regularise) for pair in zip(marches, rows, strict=True)]
+    return surfaces if isinstance(level, list | tuple) else surfaces[0]
+
+
+def _finished(march: March, data: dict[str, Rows], is_regular: bool) -> Isosurface:
+    """Hand over a surface, made regular if that is wanted."""
+    faces, rows = march.faces.finish(), {"": march.vertices.finish()}
+    rows |= {name: of_name.finish() for name, of_name in data.items()}
+    if is_regular:
+        faces, rows = regular(faces, rows, march)
+    return Isosurface(rows.pop(""), faces, march.level, rows)
+
+
+def _as_samples(
+    function: Function, bounds: Any, shape: Any, frame: NDArray[np.float64]
+) -> tuple[SampledFunction, NDArray[np.float64]]:
+    if not np.array_equal(frame, [(1, 1, 1), (0, 0, 0)]):
+        raise OptionError("a function has bounds and shape, instead of spacing and origin")
+    samples = sampled(function, bounds, shape)
+    return samples, np.array([samples.spacing, samples.origin])
+
+
+def _as_centres(centres: Any, shape: tuple[int, int, int], lattice: str) -> Planes | None:
+    if centres is None:
+        return None
+    if not LATTICES[lattice].has_centres:
+        having = ", ".join(name for name, entry in LATTICES.items() if entry.has_centres)
+        raise OptionError(f"centres are for lattices that have points there ({having})")
+    values = as_sliceable(centres)
+    wanted = tuple(n - 1 for n in shape)
+    if tuple(values.shape) != wanted or np.dtype(values.dtype).kind not in "biuf":
+        raise VolumeError(
+            f"centres must hold real numbers and have shape {wanted}, got {values.dtype} and "
+            f"{tuple(values.shape)}"
+        )
+    return Planes(values, "centres")
+
+
+def _telling(
+    progress: Progress | None, block: Block, number: int, n_surfaces: int
+) -> Callable[[float], object]:
+    """What tells the progress of the whole when told that of one surface in a block."""
+
+    def tell(part: float) -> None:
         if progress is not None:
-            progress("isosurface", march.n_planes / samples.shape[0])
-    return march.finish()
+            part = (number + part) / n_surfaces
+            n_done = block.begin + part * (block.end - block.begin)
+            progress("isosurface", n_done / block.n_planes)
 
-
-class _Plane(NamedTuple):
-    """One plane of samples."""
-
-    samples: NDArray[np.float64]
-    inside: NDArray[np.bool_]
-
-
-def _planes(volume: Any, level: float, above: bool) -> Iterator[_Plane]:
-    """Read a volume along its first axis, a few planes at a time."""
-    bytes_of_plane = 8 * volume.shape[1] * volume.shape[2]
-    at_once = max(1, BYTES_READ_AT_ONCE // bytes_of_plane)
-    for begin in range(0, volume.shape[0], at_once):
-        block = np.ascontiguousarray(volume[begin : begin + at_once])
-        is_float = block.dtype.kind == "f"
-        with np.errstate(over="ignore"):  # of types wider than float64
-            block = block.astype(np.float64, copy=False)
-        if is_float and not np.isfinite(block).all():
-            index = np.argwhere(~np.isfinite(block))[0] + (begin, 0, 0)
-            raise VolumeError(
-                f"volume must be finite, got {volume[tuple(index)]} at index {index.tolist()}"
-            )
-        inside = block > level if above else block < level
-        yield from (_Plane(*pair) for pair in zip(block, inside, strict=True))
-
-
-class _Rows:
-    """Rows of three that are added to, in an array that grows in place.
-
-    Where the system can map a large block of memory elsewhere nothing is copied, and nothing is
-    ever there twice.
-    """
-
-    def __init__(self, dtype: type) -> None:
-        self._rows: NDArray[Any] = np.empty((0, 3), dtype)
-        self.n_rows = 0
-
-    def add(self, n_rows: int) -> NDArray[Any]:
-        """A view of new rows, to be filled before more are added."""
-        begin = self.n_rows
-        self.n_rows += n_rows
-        if self.n_rows > len(self._rows):
-            self._resize(max(self.n_rows, int(GROWTH * len(self._rows))))
-        return self._rows[begin : self.n_rows]
-
-    def finish(self) -> NDArray[Any]:
-        """Exactly the rows added."""
-        self._resize(self.n_rows)
-        return self._rows
-
-    def _resize(self, n_rows: int) -> None:
-        self._rows.resize((n_rows, 3), refcheck=False)  # no view is in use any more
-
-
-class _March:
-    """Takes planes one by one and keeps what the next cubes need of the last three."""
-
-    def __init__(
-        self,
-        shape: tuple[int, int, int],
-        level: float,
-        frame: tuple[NDArray[np.float64], NDArray[np.float64]],
-        tables: Tables,
-        closed: bool,
-    ) -> None:
-        self.shape, self.level, self.tables, self.closed = shape, level, tables, closed
-        self.spacing, self.origin = frame
-        self.n_planes = 0
-        self._n_slots = len(tables.slot_ends)
-        plane_size = shape[1] * shape[2]
-        if plane_size * self._n_slots > MAX_CORNERS:
-            raise VolumeError(f"planes of {shape[1]} x {shape[2]} samples are too large")
-        # of the planes with even and odd numbers: vertices of the slots; active cubes
-        self._slot_vertex = np.empty((2, plane_size * self._n_slots), np.int32)
-        self._cubes = np.empty((2, plane_size), np.int32)
-        self._colours = np.empty((2, plane_size), np.uint8)
-        self._n_cubes = [0, 0]
-        self._edges = np.empty(plane_size * self._n_slots, np.int32)
-        self._previous: _Plane | None = None
-        self._vertices = _Rows(np.float64)
-        self._faces = _Rows(np.int32)
-
-    def add(self, plane: _Plane) -> None:
-        """Take the next plane: scan the one before, fill the cubes below that."""
-        if self._previous is not None:
-            self._scan(self.n_planes - 1, self._previous, plane)
-        self._previous = plane
-        self.n_planes += 1
-
-    def finish(self) -> Mesh:
-        """Scan the last plane and hand over the result."""
-        assert self._previous is not None
-        self._scan(self.n_planes - 1, self._previous, self._previous)
-        return Mesh(self._vertices.finish(), self._faces.finish())
-
-    def _scan(self, z: int, low: _Plane, high: _Plane) -> None:
-        n_numbered, self._n_cubes[z % 2] = kernels.marching.scan_plane(
-            low.inside.view(np.uint8),
-            high.inside.view(np.uint8),
-            z,
-            self.shape[0],
-            self.closed,
-            self.tables,
-            self._vertices.n_rows,
-            self._slot_vertex[z % 2],
-            self._edges,
-            self._cubes[z % 2],
-            self._colours[z % 2],
-        )
-        if n_numbered:
-            if self._vertices.n_rows + n_numbered > MAX_CORNERS:
-                raise VolumeError(f"the surface has more than {MAX_CORNERS:,} vertices")
-            kernels.marching.place_vertices(
-                low.samples,
-                high.samples,
-                self.level,
-                z,
-                self.spacing,
-                self.origin,
-                self.tables,
-                self._edges[:n_numbered],
-                self._vertices.add(n_numbered),
-            )
-        if z > 0:
-            self._emit(z - 1)
-
-    def _emit(self, z: int) -> None:
-        """Write the triangles of the cubes between planes z and z + 1."""
-        cubes = self._cubes[z % 2][: self._n_cubes[z % 2]]
-        if not len(cubes):
-            return
-        colours = self._colours[z % 2][: len(cubes)]
-        self._emit_table(z, cubes, colours, self.tables.first, self.tables.triangles)
-        if not self.closed:
-            return
-        rows, columns = np.divmod(cubes, self.shape[2])
-        z_of_cubes = np.full(len(cubes), z)
-        for axis, index in enumerate((z_of_cubes, rows, columns)):
-            for high, side_index in enumerate((0, self.shape[axis] - 2)):
-                on_side = index == side_index
-                if on_side.any():
-                    first = self.tables.cap_first[2 * axis + high]
-                    table = (first, self.tables.cap_triangles)
-                    self._emit_table(z, cubes[on_side], colours[on_side], *table)
-
-    def _emit_table(
-        self,
-        z: int,
-        cubes: NDArray[np.int32],
-        colours: NDArray[np.uint8],
-        first: NDArray[np.int32],
-        triangles: NDArray[np.int32],
-    ) -> None:
-        n_faces = kernels.marching.count_triangles(colours, first)
-        if 3 * (self._faces.n_rows + n_faces) > MAX_CORNERS:
-            raise VolumeError(f"the surface has more than {MAX_CORNERS:,} face corners")
-        kernels.marching.emit_triangles(
-            cubes,
-            colours,
-            self.shape[2],
-            first,
-            triangles,
-            self._slot_vertex[z % 2],
-            self._slot_vertex[(z + 1) % 2],
-            self._n_slots,
-            self._faces.add(n_faces),
-        )
+    return tell

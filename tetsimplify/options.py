@@ -49,7 +49,7 @@ GUARDS_OF_QUADRICS = {
 """What "auto" means for them where edges are judged by the quadric error."""
 
 
-BOUNDARY_WEIGHT = 1.0  # of the planes that hold boundary edges, against those of faces
+BOUNDARY_WEIGHT = 10.0
 FEATURE_WEIGHT = 10.0  # of the planes that hold feature edges
 
 UNLIMITED_STEPS = 2**62

@@ -16,7 +16,9 @@ from tetsimplify.options import Progress
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
 SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
-N_SWEEPS = 4  # with a threshold each, before costs are compared over the whole surface again
+NEAR_END = 2.0  # times the faces asked for are left
+LENIENCE = 2.0  # before the end: triangles that become worse have time to become better again
+N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
 
 
 def run(engine: Engine, progress: Progress | None = None) -> None:
@@ -53,7 +55,9 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
         least = thresholds[-1]
         done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
         n_contracted = engine.sweep_ranked(
-            thresholds, progress, done, divided=engine.is_divided and not n_barren
+            *(thresholds, progress, done),
+            lenience=1.0 if is_near_end(engine) else LENIENCE,
+            divided=engine.is_divided and not n_barren,
         )
         n_barren = 0 if n_contracted else n_barren + 1
         if least == np.inf:
@@ -63,6 +67,11 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
             retry = True
         engine.compact_when_half()
         engine.rank()
+
+
+def is_near_end(engine: Engine) -> bool:
+    """Whether at most half of the faces that are left have still to go."""
+    return engine.n_faces <= NEAR_END * engine.min_faces
 
 
 def next_thresholds(engine: Engine, least: float, n_barren: int = 0) -> NDArray[np.float64]:
@@ -84,7 +93,7 @@ def next_thresholds(engine: Engine, least: float, n_barren: int = 0) -> NDArray[
     """
     costs = engine.sample_of_costs()
     n_faces, min_faces = engine.n_faces, engine.min_faces
-    share = SHARES[0] if n_faces > 2 * min_faces else SHARES[1]
+    share = SHARES[is_near_end(engine)]
     most = (n_faces - min_faces) / (3 * n_faces) if min_faces else 1.0
     shares = 1.0 - (1.0 - share) ** np.arange(1, N_SWEEPS + 1)
     shares = np.unique(np.minimum(shares, most))

@@ -24,7 +24,7 @@ from tetsimplify.kernels.state import (
     FOLLOWER,
     INTERSECTION,
     LOCKED,
-    MAX_COST,
+    MAX_PRICE,
     MOVED,
     N_LENS_FACES,
     N_LENS_VERTICES,
@@ -130,7 +130,7 @@ def _judge(quadrics, scratch, rules, v, u):
     if error > (weight(terms, v) + weight(terms, u)) * error_bound(quadrics, v, u):
         return ERROR_BOUND
     scratch.point[COST] = increase(terms, v, u, error) * scratch.point[FACTOR]
-    is_dear = scratch.point[COST] > scratch.point[MAX_COST] and not rules.by_length
+    is_dear = scratch.point[COST] > scratch.point[MAX_PRICE] and not rules.by_length
     return TOO_DEAR if is_dear else CONTRACTIBLE
 
 

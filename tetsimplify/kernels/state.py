@@ -90,9 +90,9 @@ TALLY_SIZE = 14
 
 # In `Scratch.point`: parameter of the new vertex along its edge; quadric error at it; factor for
 # the shapes of the triangles there; cost of it all; how far vertices may be removed, squared;
-# where costs are kept, what an edge may cost in this sweep.
-PLACE, ERROR, FACTOR, COST, REMOVAL2, MAX_COST = 3, 4, 5, 6, 7, 8
-POINT_SIZE = 9
+# where costs are kept, what an edge may cost in this sweep, and with the factor for the shapes.
+PLACE, ERROR, FACTOR, COST, REMOVAL2, MAX_COST, MAX_PRICE = 3, 4, 5, 6, 7, 8, 9
+POINT_SIZE = 10
 
 # Rows of `Scratch.nodes`.
 SLOT = 0  # sparse set: place of a vertex in some list

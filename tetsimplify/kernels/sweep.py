@@ -20,6 +20,7 @@ from tetsimplify.kernels.state import (
     DEFERRED,
     ERROR_BOUND,
     MAX_COST,
+    MAX_PRICE,
     MOVED,
     N_DEFERRED,
     N_SPARE,
@@ -144,7 +145,9 @@ def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, 
 
 
 @kernel_in_place
-def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, thresholds, listed, blocks):
+def sweep_ranked(
+    surface, quadrics, watch, scratch, rules, cost, thresholds, lenience, listed, blocks
+):
     """Sweep over blocks with a threshold that grows: at most one edge of each face in each sweep.
 
     An edge that is refused waits for a higher threshold: for what it costs at the place where it
@@ -155,6 +158,8 @@ def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, thresholds, lis
     cost : float32 (3 m,)
         Of the edge that begins at each corner; up to date.
     thresholds : float64 (n_sweeps,)
+    lenience : float
+        So many times the threshold an edge may cost together with the factor for the shapes.
     listed : int32
         Faces, in the order in which they are looked at.
     blocks : int64 (k, 4)
@@ -170,6 +175,7 @@ def sweep_ranked(surface, quadrics, watch, scratch, rules, cost, thresholds, lis
         first, last = _enter(scratch, blocks, b)
         for i in range(thresholds.size):
             scratch.point[MAX_COST] = thresholds[i]
+            scratch.point[MAX_PRICE] = lenience * thresholds[i]
             is_last = i + 1 == thresholds.size
             n_contracted += _sweep_block_ranked(
                 surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last

@@ -1,0 +1,75 @@
+"""Threads that stay, for many small passes over the same data."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from types import TracebackType
+from typing import TypeVar
+
+from tetsimplify.errors import OptionError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+PARTS_A_THREAD = 4  # so that threads that are done early take what is left
+LARGEST_PART = 32
+
+
+class Workers:
+    """Threads that share passes; a context manager.
+
+    Parameters
+    ----------
+    threads : int or None
+        How many; None for all cores that the process may use. With one, everything is done in
+        the thread of the caller.
+
+    Raises
+    ------
+    OptionError
+        When `threads` is no positive integer.
+    """
+
+    def __init__(self, threads: int | None) -> None:
+        if threads is None:
+            can_tell = hasattr(os, "sched_getaffinity")
+            threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise OptionError(f"threads must be a positive integer, got {threads!r}")
+        self._threads = threads
+        self._pool: ThreadPoolExecutor | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+    def map(self, task: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """What comes of each item, in their order."""
+        return list(self.each(task, items))
+
+    def each(self, task: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+        """What comes of each item as soon as it and those before it are done."""
+        if self._threads == 1 or len(items) == 1:
+            return map(task, items)
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self._threads)
+        return self._pool.map(task, items)
+
+    def parts(self, begin: int, end: int, least: int = 1) -> list[tuple[int, int]]:
+        """Cut a range into parts of about the same length, of at least so many items."""
+        n_items = end - begin
+        n_parts = PARTS_A_THREAD * self._threads if self._threads > 1 else 1
+        n_parts = min(max(n_parts, -(-n_items // LARGEST_PART)), max(1, n_items // least))
+        bounds = [begin + n_items * k // n_parts for k in range(n_parts + 1)]
+        return list(pairwise(bounds))
