@@ -266,6 +266,10 @@ def simplify(
     repair: Annotated[
         bool, typer.Option("--repair", help="Make the mesh an oriented manifold first.")
     ] = False,
+    threads: Annotated[
+        int | None,
+        typer.Option(help="So many, which changes nothing but the time; all cores if not given."),
+    ] = None,
     level: Level = None,
     closed: Closed = False,
     lattice: Lattice = None,
@@ -307,7 +311,7 @@ def simplify(
         volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
         chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
         mesh = _read(this, source, level, chosen, spacing, volume_options)
-        result = _simplify(this, mesh, repair=repair, **wanted.options(mesh))
+        result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
         _write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
             {

@@ -45,7 +45,7 @@ from tetsimplify.kernels.state import (
 from tetsimplify.kernels.watch import follow, star_crosses
 
 
-@part
+@inlined
 def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 

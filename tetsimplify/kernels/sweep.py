@@ -11,7 +11,7 @@ import numpy as np
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.cost import cheapest_first, edge_costs, rank_faces
-from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.jit import inlined, kernel_in_place, part
 from tetsimplify.kernels.state import (
     BLOCK,
     BLOCKED,
@@ -106,7 +106,7 @@ def sweep(surface, quadrics, watch, scratch, rules, listed, blocks, n_sweeps, co
     return n_contracted
 
 
-@part
+@inlined
 def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, colour, retry):
     """Sweep once over the faces listed from `first` to `last`."""
     n_contracted = 0
@@ -184,7 +184,7 @@ def sweep_ranked(
     return n_contracted
 
 
-@part
+@inlined
 def _sweep_block_ranked(
     surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last
 ):

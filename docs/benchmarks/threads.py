@@ -1,0 +1,107 @@
+"""One thread and two, in turn with two of the peers: extraction, by length, by quadric error.
+
+python docs/benchmarks/threads.py --faces 2000000 --repeats 5
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from common import TOOLS, Row, as_markdown, gyroid
+from simplify import length_that_keeps
+
+import tetsimplify
+
+KEPT = 0.15  # of the faces
+THREADS = (1, 2)
+PEERS = ("meshoptimizer", "fast-simplification")
+
+
+def in_turn(works: dict[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
+    """Median seconds by the wall clock; one call of each first, which does not count."""
+    seconds: dict[str, list[float]] = {name: [] for name in works}
+    for i in range(repeats + 1):
+        for name, work in works.items():
+            begin = time.perf_counter()
+            work()
+            if i:
+                seconds[name].append(time.perf_counter() - begin)
+    return {name: statistics.median(some) for name, some in seconds.items()}
+
+
+def simplifications(n_faces: int, repeats: int) -> list[Row]:
+    """Contraction by length and by quadric error, and the peers, to the same number of faces."""
+    mesh = gyroid(n_faces)
+    length = length_that_keeps(mesh, KEPT)
+    target = round(KEPT * len(mesh.faces))
+    works: dict[str, Callable[[], Any]] = {}
+    for n in THREADS:
+        works[f"by length, {n}"] = lambda n=n: tetsimplify.simplify(
+            *mesh, max_edge_length=length, threads=n
+        )
+        works[f"by error, {n}"] = lambda n=n: tetsimplify.simplify(
+            *mesh, target_faces=target, threads=n
+        )
+    for tool in TOOLS:
+        if tool.name in PEERS:
+            works[tool.name] = lambda tool=tool: tool.run(tool.prepare(mesh), target)
+    seconds = in_turn(works, repeats)
+    rows = []
+    for mode in ("by length", "by error"):
+        one, two = (seconds[f"{mode}, {n}"] for n in THREADS)
+        row = {
+            f"{len(mesh.faces):,} faces": mode,
+            "1 thread, s": f"{one:.2f}",
+            "2, s": f"{two:.2f}",
+            "1 / 2": f"{one / two:.2f}",
+        }
+        for peer in PEERS:
+            if peer in seconds:
+                row[f"{peer}, s"] = f"{seconds[peer]:.2f}"
+                row[f"{peer} / 2 threads"] = f"{seconds[peer] / two:.2f}"
+        rows.append(row)
+    return rows
+
+
+def extractions(n: int, repeats: int) -> list[Row]:
+    """Marching tetrahedra over a gyroid of n samples a side."""
+    angle = 4.0 * np.pi * np.arange(n) / n
+    x, y, z = np.meshgrid(angle + 0.1, angle + 0.2, angle + 0.3, indexing="ij", sparse=True)
+    volume = (np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).astype("f4")
+    works: dict[str, Callable[[], Any]] = {
+        f"{n}": lambda n=n: tetsimplify.extract_isosurface(volume, 0.0, threads=n) for n in THREADS
+    }
+    seconds = in_turn(works, repeats)
+    n_faces = len(tetsimplify.extract_isosurface(volume, 0.0).faces)
+    one, two = (seconds[f"{n}"] for n in THREADS)
+    return [
+        {
+            "volume": f"{n}³",
+            "faces": f"{n_faces:,}",
+            "1 thread, s": f"{one:.2f}",
+            "2, s": f"{two:.2f}",
+            "1 / 2": f"{one / two:.2f}",
+            "million faces / s, 2 threads": f"{n_faces / two / 1e6:.1f}",
+        }
+    ]
+
+
+def main() -> None:
+    """Measure, and print tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--faces", type=int, default=2_000_000)
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--repeats", type=int, default=5)
+    arguments = parser.parse_args()
+    rows = simplifications(arguments.faces, arguments.repeats)
+    print(as_markdown(f"gyroid, cut to {KEPT:.0%}", rows))
+    print(as_markdown("gyroid, extracted", extractions(arguments.samples, arguments.repeats)))
+
+
+if __name__ == "__main__":
+    main()
