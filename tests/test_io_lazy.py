@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tetsimplify.errors import FileError
@@ -48,6 +48,7 @@ def indices(n):
     depth=st.integers(1, 7),
     n_keys=st.integers(0, 3),
 )
+@example(order=(0, 1, 2), key=(0, slice(-6, None, -1), 0), depth=1, n_keys=2)
 def test_slices_are_those_of_the_array(order, key, depth, n_keys):
     array = samples(np.int16, (5, 5, 5))
     volume, _ = lazy_array(array, chunk_depth=depth)

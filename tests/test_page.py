@@ -417,7 +417,7 @@ def test_in_a_browser(report, tmp_path):
     options += ["--enable-unsafe-swiftshader", f"--user-data-dir={tmp_path / 'profile'}"]
     options += ["--window-size=1280,1000", "--virtual-time-budget=30000", "--dump-dom"]
     run = subprocess.run(
-        [browser, *options, path.as_uri()], capture_output=True, text=True, timeout=120
+        [browser, *options, path.as_uri()], capture_output=True, encoding="utf-8", timeout=120
     )
     outcomes = list(Elements(run.stdout).of("pre", id="outcome"))
     assert outcomes, run.stderr[-2000:]

@@ -10,8 +10,9 @@ from tetsimplify.errors import (
     TetsimplifyError,
     VolumeError,
 )
+from tetsimplify.interfaces import Interfaces, extract_interfaces
 from tetsimplify.intersections import IntersectionReport, self_intersections
-from tetsimplify.isosurface import extract_isosurface
+from tetsimplify.isosurface import Isosurface, extract_isosurface
 from tetsimplify.mesh import Mesh
 from tetsimplify.quality import QualityReport, quality
 from tetsimplify.repair import repair
@@ -24,7 +25,9 @@ __version__ = "0.1.0"
 __all__ = [
     "Comparison",
     "FileError",
+    "Interfaces",
     "IntersectionReport",
+    "Isosurface",
     "Mesh",
     "MeshError",
     "MissingExtraError",
@@ -38,6 +41,7 @@ __all__ = [
     "TopologyReport",
     "VolumeError",
     "compare",
+    "extract_interfaces",
     "extract_isosurface",
     "quality",
     "repair",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from itertools import pairwise
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -115,7 +116,6 @@ class Engine:
         n_coned = n + self.topology_before.n_boundary_loops
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
-        self._idle: SimpleQueue[Scratch] = SimpleQueue()
         self.n_threads = Crew(threads).n_threads
 
     @property
@@ -330,15 +330,25 @@ class Engine:
         Returns the number of contractions.
         """
         state, surface, scratch = kernels.state, self._surface, self._scratch
+        ends = all_blocks[blocks.AT_ONCE - 1 :: blocks.AT_ONCE, 1].tolist()
+        ends = [*ends, int(all_blocks[-1, 1])]
+        room = max(end - begin for begin, end in pairwise([0, *ends]))
+        idle: SimpleQueue[Scratch] = SimpleQueue()
+
+        def borrow() -> Scratch:
+            try:
+                return idle.get_nowait()
+            except Empty:
+                return start_scratch(room, len(scratch.mark), 0)
 
         def do(part: slice) -> _Done:
-            own, some = self._borrow_scratch(), all_blocks[part]
+            own, some = borrow(), all_blocks[part]
             own.tally[: state.N_DONE] = own.tally[state.N_DEFERRED] = 0
             merges = np.empty((int((some[:, 1] - some[:, 0]).sum()), 2))
             n_contracted = task(surface._replace(merges=merges), own, some)
             deferred = own.lists[state.DEFERRED, : own.tally[state.N_DEFERRED]].copy()
             done = _Done(own.tally[: state.N_DONE].copy(), merges[:n_contracted].copy(), deferred)
-            self._idle.put(own)
+            idle.put(own)
             return done
 
         def tell(name: str, done: float) -> None:
@@ -359,13 +369,6 @@ class Engine:
             scratch.tally[state.N_DEFERRED] += len(done.deferred)
         self._unite()
         return n_contracted
-
-    def _borrow_scratch(self) -> Scratch:
-        """Scratch space for the thread that asks."""
-        try:
-            return self._idle.get_nowait()
-        except Empty:
-            return start_scratch(len(self._listed), len(self._scratch.mark), 0)
 
     def mesh(self) -> Mesh:
         """The live faces, with all vertices under their old numbers."""

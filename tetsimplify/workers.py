@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from types import TracebackType
 from typing import TypeVar
 
-from tetsimplify.errors import OptionError
+from tetsimplify.crew import Crew
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -34,12 +33,7 @@ class Workers:
     """
 
     def __init__(self, threads: int | None) -> None:
-        if threads is None:
-            can_tell = hasattr(os, "sched_getaffinity")
-            threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-            raise OptionError(f"threads must be a positive integer, got {threads!r}")
-        self._threads = threads
+        self._threads = Crew(threads).n_threads
         self._pool: ThreadPoolExecutor | None = None
 
     def __enter__(self) -> Workers:

@@ -175,4 +175,6 @@ def _slab_depth(plane_bytes: int, chunk_depth: int) -> int:
 
 
 def _slice(indices: range) -> slice:
+    if not indices:  # whose ends may be anything
+        return slice(0)
     return slice(indices.start, indices.stop if indices.stop >= 0 else None, indices.step)
