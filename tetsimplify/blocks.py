@@ -46,8 +46,8 @@ def two_ways(mesh: Mesh) -> Cells:
     """
     m = len(mesh.faces)
     by_order = (np.arange(m) // CELL).astype(np.int32)
-    low = mesh.vertices.min(axis=0)
-    extent = float((mesh.vertices.max(axis=0) - low).max())
+    low, high = kernels.order.bounds(mesh.vertices)
+    extent = float((high - low).max())
     bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / CELL))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
     shifted, n_shifted = kernels.order.morton_cells(

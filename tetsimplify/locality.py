@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from tetsimplify import kernels
 from tetsimplify.mesh import Mesh
 
-BITS = 10  # of the number of cells of the curve along an axis
-
 
 class Arrangement(NamedTuple):
     """A mesh whose vertices and faces are in an order of their own."""
@@ -38,16 +36,12 @@ def by_locality(mesh: Mesh) -> Arrangement:
     So a run of faces is a compact piece of the surface, which fits a cache and has few edges in
     common with other runs.
     """
-    n = len(mesh.vertices)
-    low = mesh.vertices.min(axis=0)
-    extent = float((mesh.vertices.max(axis=0) - low).max())
-    scale = 2.0**BITS / extent if extent > 0.0 else 0.0
-    keys = kernels.order.morton_keys(mesh.vertices, low, scale, 2**BITS - 1)
-    keys.sort()
-    vertex_origin = (keys & 0xFFFFFFFF).astype(np.int32)
-    vertex_place = np.empty(n, np.int32)
-    vertex_place[vertex_origin] = np.arange(n, dtype=np.int32)
-    faces = vertex_place[mesh.faces]
-    face_origin = kernels.order.sort_faces(faces, n)
-    arranged = Mesh(mesh.vertices[vertex_origin], faces[face_origin])
+    low, high = kernels.order.bounds(mesh.vertices)
+    extent = float((high - low).max())
+    scale = kernels.order.N_CELLS / extent if extent > 0.0 else 0.0
+    vertex_origin = kernels.order.sort_vertices(mesh.vertices, low, scale)
+    vertex_place = np.empty_like(vertex_origin)
+    vertex_place[vertex_origin] = np.arange(len(vertex_origin), dtype=np.int32)
+    face_origin, faces = kernels.order.sort_faces(mesh.faces, vertex_place)
+    arranged = Mesh(mesh.vertices.take(vertex_origin, axis=0), faces)
     return Arrangement(arranged, vertex_origin, vertex_place, face_origin)

@@ -4,6 +4,8 @@ import numpy as np
 
 from tetsimplify.kernels.jit import kernel, part
 
+N_CELLS = 2**10  # along an axis, for the order of the vertices
+
 
 @part
 def _spread(x):
@@ -25,8 +27,21 @@ def _morton(vertices, v, low, scale, most):
 
 
 @kernel
-def morton_keys(vertices, low, scale, most):
-    """Keys that sort vertices along a Z-order curve, and those in one cell by number.
+def bounds(vertices):
+    """The least and the largest coordinates, as rows."""
+    box = np.empty((2, 3))
+    for axis in range(3):
+        box[0, axis], box[1, axis] = np.inf, -np.inf
+    for v in range(len(vertices)):
+        for axis in range(3):
+            box[0, axis] = min(box[0, axis], vertices[v, axis])
+            box[1, axis] = max(box[1, axis], vertices[v, axis])
+    return box
+
+
+@kernel
+def sort_vertices(vertices, low, scale):
+    """Sort vertices along a Z-order curve through N_CELLS cells a side, and in a cell by number.
 
     Parameters
     ----------
@@ -34,18 +49,29 @@ def morton_keys(vertices, low, scale, most):
         The corner of the first cell.
     scale : float
         Cells in a unit of length.
-    most : int
-        Number of the last cell along an axis.
 
     Returns
     -------
-    int64 (n,)
-        The number of each vertex in the lower half, the curve in the upper one.
+    int32 (n,)
+        The vertices in their order.
     """
-    keys = np.empty(len(vertices), np.int64)
-    for v in range(len(vertices)):
-        keys[v] = (_morton(vertices, v, low, scale, most) << 32) | v
-    return keys
+    n = len(vertices)
+    codes = np.empty(n, np.int32)
+    for v in range(n):
+        codes[v] = _morton(vertices, v, low, scale, N_CELLS - 1)
+    order, sorted_order = np.arange(n, dtype=np.int32), np.empty(n, np.int32)
+    for shift in (0, 15):  # by the lower halves of the codes, then by the upper ones
+        first = np.zeros(2**15 + 1, np.int32)
+        for v in range(n):
+            first[((codes[v] >> shift) & 0x7FFF) + 1] += 1
+        for half in range(2**15):
+            first[half + 1] += first[half]
+        for i in range(n):
+            half = (codes[order[i]] >> shift) & 0x7FFF
+            sorted_order[first[half]] = order[i]
+            first[half] += 1
+        order, sorted_order = sorted_order, order
+    return order
 
 
 @kernel
@@ -54,8 +80,10 @@ def morton_cells(vertices, faces, low, scale, most):
 
     Parameters
     ----------
-    low, scale, most
-        As of :func:`morton_keys`.
+    low, scale
+        As of :func:`sort_vertices`.
+    most : int
+        Number of the last cell along an axis.
 
     Returns
     -------
@@ -79,16 +107,32 @@ def morton_cells(vertices, faces, low, scale, most):
 
 
 @kernel
-def sort_faces(faces, n_vertices):
-    """The faces in the order of their first vertices, as a permutation."""
-    first = np.zeros(n_vertices + 1, np.int32)
+def sort_faces(faces, place):
+    """Sort faces by the first of their vertices.
+
+    Parameters
+    ----------
+    faces : int32 (m, 3)
+    place : int32 (n,)
+        Where each vertex comes in the order of the vertices.
+
+    Returns
+    -------
+    order : int32 (m,)
+        The faces in their order.
+    arranged : int32 (m, 3)
+        The same with the places of their vertices.
+    """
+    first = np.zeros(place.size + 1, np.int32)
     for f in range(len(faces)):
-        first[min(faces[f, 0], faces[f, 1], faces[f, 2]) + 1] += 1
-    for v in range(n_vertices):
+        first[min(place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]) + 1] += 1
+    for v in range(place.size):
         first[v + 1] += first[v]
-    order = np.empty(len(faces), np.int32)
+    order, arranged = np.empty(len(faces), np.int32), np.empty((len(faces), 3), np.int32)
     for f in range(len(faces)):
-        v = min(faces[f, 0], faces[f, 1], faces[f, 2])
-        order[first[v]] = f
-        first[v] += 1
-    return order
+        a, b, c = place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]
+        at = first[min(a, b, c)]
+        first[min(a, b, c)] += 1
+        order[at] = f
+        arranged[at, 0], arranged[at, 1], arranged[at, 2] = a, b, c
+    return order, arranged
