@@ -29,6 +29,7 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(blocks, "CELL", 30)
     monkeypatch.setattr(blocks, "AT_ONCE", 4)
     monkeypatch.setattr("tetsimplify.engine.LEAST_SPARE", 1)
+    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
 
 
 def grid_of_tubes(n=70):
@@ -72,8 +73,9 @@ def test_every_face_is_in_one_block(small_blocks):
             assert (engine._surface.face_block[listed[first:last]] == number).all()
 
 
-def test_what_lies_between_blocks_is_inside_of_those_of_the_other_way():
+def test_what_lies_between_blocks_is_inside_of_those_of_the_other_way(monkeypatch):
     """Where both ways have a border no edge can be contracted: only few may be there."""
+    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
     mesh = grid_of_tubes(80)
     engine = engine_of(mesh, max_edge_length=1.0)
     borders = []
@@ -228,6 +230,7 @@ def test_no_seams_are_left_between_blocks(mode, monkeypatch):
     """Edges next to what was a border are as long as those inside."""
     monkeypatch.setattr(blocks, "FACES", 512)
     monkeypatch.setattr(blocks, "CELL", 128)
+    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
     mesh = grid_of_tubes(80)
     engine = engine_of(mesh, **mode)
     engine._divide()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`, where there are no blocks
 LEAST_BLOCKS = 4  # a surface of fewer is not divided
+LEAST_BELOW_LENGTH = 512  # the same below one length: for fewer the order takes what threads earn
 LEAST_SPARE = 64  # faces a block on the average: with fewer to go the surface is not divided
 MOST_SWEEPS = 8  # over a block below one length, before its edges to others have their turn
 NOTHING = 1e-8  # of the diagonal: a quadric error or a length that is as good as none
@@ -94,7 +95,7 @@ class Engine:
     ) -> None:
         n, m = len(mesh.vertices), len(mesh.faces)
         self._may_divide = (
-            m >= LEAST_BLOCKS * blocks.FACES
+            m >= blocks.FACES * (LEAST_BELOW_LENGTH if options.has_one_threshold else LEAST_BLOCKS)
             and options.blocked != "violate"
             and options.intersections == "allow"
         )
