@@ -17,7 +17,8 @@ from tetsimplify.options import Progress
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
 SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
 NEAR_END = 2.0  # times the faces asked for are left
-LENIENCE = 2.0  # before the end: triangles that become worse have time to become better again
+LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: triangles that become
+LENIENT = 4.0  # worse have time to become better again
 N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
 
 
@@ -56,7 +57,7 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
         done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
         n_contracted = engine.sweep_ranked(
             *(thresholds, progress, done),
-            lenience=1.0 if is_near_end(engine) else LENIENCE,
+            lenience=LENIENCE if engine.n_faces > LENIENT * engine.min_faces else 1.0,
             divided=engine.is_divided and not n_barren,
         )
         n_barren = 0 if n_contracted else n_barren + 1
