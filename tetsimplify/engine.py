@@ -363,11 +363,10 @@ class Engine:
             n_contracted += len(done.merges)
             surface.merges[n_before : n_before + len(done.merges)] = done.merges
             scratch.tally[: state.N_DONE] += done.tally
-            n_deferred = self.tally("N_DEFERRED")
-            scratch.lists[state.DEFERRED, n_deferred : n_deferred + len(done.deferred)] = (
-                done.deferred
-            )
-            scratch.tally[state.N_DEFERRED] += len(done.deferred)
+            room_left = scratch.lists[state.DEFERRED, self.tally("N_DEFERRED") :]
+            deferred = done.deferred[: len(room_left)]  # a later sweep finds the others again
+            room_left[: len(deferred)] = deferred
+            scratch.tally[state.N_DEFERRED] += len(deferred)
         self._unite()
         return n_contracted
 

@@ -44,11 +44,11 @@ from common import (
     spread,
     timed,
 )
-from numpy.typing import NDArray
 from rich.console import Console
 
 import tetsimplify
-from tetsimplify import Mesh, demo, kernels
+from tetsimplify import Mesh, demo
+from tetsimplify.comparison.measuring import n_flipped, normals
 from tetsimplify.io import read_mesh
 from tetsimplify.targets import Target
 
@@ -147,30 +147,6 @@ def run(
             yield tool.name, times, None if repeat else tool.finish(raw)
             if times["cpu"] > patience:
                 tools.remove(tool)
-
-
-def normals(mesh: Mesh) -> NDArray[np.float64]:
-    """Normals of all faces, as long as twice their areas."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
-
-
-def n_flipped(result: Mesh, target: Target, given: NDArray[np.float64]) -> int:
-    """Number of faces whose normal is opposite to that of the input nearest to their centre."""
-    centres = target.frame.enter(result.vertices[result.faces].mean(axis=1))
-    nearest = np.empty(len(centres), np.int32)
-    source = kernels.distance.Source(
-        vertices=centres,
-        faces=result.faces,
-        vertex_distance=np.empty(len(centres)),
-        vertex_nearest=nearest,
-        centre_distance=np.empty(0),
-        centre_nearest=np.empty(0, np.int32),
-    )
-    chosen = np.arange(len(centres), dtype=np.int32)
-    stack = kernels.nearest.Stack.new()
-    kernels.distance.measure_vertices(target.arrays, source, chosen, stack)
-    return int((np.einsum("ij,ij->i", normals(result), given[nearest]) < 0.0).sum())
 
 
 def look_at(measured: Measured, case: Case, target: Target, result: Mesh) -> None:

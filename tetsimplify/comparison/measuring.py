@@ -48,7 +48,7 @@ class Reference:
         return {
             **self._topology(result),
             **self._shape(result, short_length),
-            "n_flipped_faces": self._n_flipped(result),
+            "n_flipped_faces": n_flipped(result, self.target, self.normals),
             "n_self_intersections": self_intersections(*result).n_pairs,
             "distance": self._distance(result, tolerance * self.given.diagonal),
             "volume_change": self._volume_change(result),
@@ -91,24 +91,6 @@ class Reference:
                 },
             },
         }
-
-    def _n_flipped(self, result: Mesh) -> int:
-        """Faces whose normal is opposite to that of the input nearest to their centre."""
-        centres = self.target.frame.enter(result.vertices[result.faces].mean(axis=1))
-        nearest = np.empty(len(centres), np.int32)
-        source = kernels.distance.Source(
-            vertices=centres,
-            faces=result.faces,
-            vertex_distance=np.empty(len(centres)),
-            vertex_nearest=nearest,
-            centre_distance=np.empty(0),
-            centre_nearest=np.empty(0, np.int32),
-        )
-        every = np.arange(len(centres), dtype=np.int32)
-        stack = kernels.nearest.Stack.new()
-        kernels.distance.measure_vertices(self.target.arrays, source, every, stack)
-        agreement = np.einsum("ij,ij->i", normals(result), self.normals[nearest])
-        return int((agreement < 0.0).sum())
 
     def _distance(self, result: Mesh, tolerance: float) -> dict[str, Any]:
         found = surface_distance(result, self.given.mesh, tolerance=tolerance)
@@ -192,3 +174,30 @@ def signed_volume(mesh: Mesh) -> float:
     middle = mesh.vertices.mean(axis=0)
     first = mesh.vertices[mesh.faces[:, 0]] - middle
     return float(np.einsum("ij,ij->", first, normals(mesh)) / 6.0)
+
+
+def n_flipped(result: Mesh, target: Target, given: Floats) -> int:
+    """Number of faces whose normal is opposite to that of the input nearest to their centre.
+
+    Parameters
+    ----------
+    result : Mesh
+    target : Target
+        The input.
+    given : ndarray, shape (m, 3), float64
+        Normals of the faces of the input, of any length.
+    """
+    centres = target.frame.enter(result.vertices[result.faces].mean(axis=1))
+    nearest = np.empty(len(centres), np.int32)
+    source = kernels.distance.Source(
+        vertices=centres,
+        faces=result.faces,
+        vertex_distance=np.empty(len(centres)),
+        vertex_nearest=nearest,
+        centre_distance=np.empty(0),
+        centre_nearest=np.empty(0, np.int32),
+    )
+    every = np.arange(len(centres), dtype=np.int32)
+    stack = kernels.nearest.Stack.new()
+    kernels.distance.measure_vertices(target.arrays, source, every, stack)
+    return int((np.einsum("ij,ij->i", normals(result), given[nearest]) < 0.0).sum())

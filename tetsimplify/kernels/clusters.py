@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.jit import kernel_in_place
 from tetsimplify.kernels.marching import WORD
+from tetsimplify.kernels.sets import find, unite
 
 
 @kernel_in_place
@@ -52,18 +53,9 @@ def join_neighbours(faces, keys, cluster):
         for k in range(3):
             v, u = faces[f, k], faces[f, (k + 1) % 3]
             if keys[v] == keys[u]:
-                a, b = _root(cluster, v), _root(cluster, u)
-                cluster[max(a, b)] = min(a, b)
+                unite(cluster, v, u)
     for v in range(cluster.size):
-        cluster[v] = _root(cluster, v)
-
-
-@part
-def _root(cluster, v):
-    while cluster[v] != v:
-        cluster[v] = cluster[cluster[v]]
-        v = cluster[v]
-    return v
+        cluster[v] = find(cluster, v)
 
 
 @kernel_in_place
