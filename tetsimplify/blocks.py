@@ -20,8 +20,10 @@ from tetsimplify import kernels
 from tetsimplify.mesh import Mesh
 
 FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
+RUN = 2**16  # faces in a block of faces as they are given: few of so many are at its ends
 CELL = 2**10  # faces: blocks are made of cells of about so many
-AT_ONCE = 16  # blocks in a task for a thread
+AT_ONCE = 16  # blocks of FACES in a task for a thread
+MOST_SHARED = 0.2  # of the vertices of runs may be between them
 UNLIMITED = 2**62  # faces that may go
 MOST_BITS = 7  # of the cells along an axis
 SHIFT = 1.0 / 3.0  # of the extent, by which the cells of the second way are shifted: all planes
@@ -37,6 +39,12 @@ class Cells(NamedTuple):
     of_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
     """Shapes (m,)."""
     counts: tuple[int, int]
+    least: int
+    """Faces in a block, at least."""
+    first: tuple[int, int]
+    """The same for the first block of each way."""
+    at_once: int
+    """Blocks in a task for a thread."""
 
 
 def two_ways(mesh: Mesh) -> Cells:
@@ -53,7 +61,23 @@ def two_ways(mesh: Mesh) -> Cells:
     shifted, n_shifted = kernels.order.morton_cells(
         mesh.vertices, mesh.faces, low - SHIFT * extent, scale, 2**bits - 1
     )
-    return Cells((by_order, shifted), (m // CELL + 1, n_shifted))
+    return Cells((by_order, shifted), (m // CELL + 1, n_shifted), FACES, (FACES, FACES), AT_ONCE)
+
+
+def runs(mesh: Mesh) -> Cells | None:
+    """Cells of a mesh as it is given: its blocks are runs of faces, which are shifted by half.
+
+    None where faces that follow one another lie apart, so that much would be between the runs.
+    """
+    m = len(mesh.faces)
+    by_order = (np.arange(m) // CELL).astype(np.int32)
+    n_cells = m // CELL + 1
+    cells = Cells((by_order, by_order), (n_cells, n_cells), RUN, (RUN, RUN // 2), 1)
+    block_of = np.empty(len(mesh.vertices), np.int32)
+    listed = np.empty(m, np.int32)
+    divide(cells, 0, mesh.faces.reshape(-1), block_of, listed)
+    n_shared = np.count_nonzero(block_of == kernels.blocks.SHARED)
+    return cells if n_shared <= MOST_SHARED * len(block_of) else None
 
 
 def copy_live(cells: Cells, corner_vertex: NDArray[np.int32], n_live: int) -> Cells:
@@ -61,14 +85,14 @@ def copy_live(cells: Cells, corner_vertex: NDArray[np.int32], n_live: int) -> Ce
     live = np.empty((2, n_live), np.int32)
     for way in range(2):
         kernels.blocks.copy_cells(corner_vertex, cells.of_faces[way], live[way])
-    return Cells((live[0], live[1]), cells.counts)
+    return cells._replace(of_faces=(live[0], live[1]))
 
 
 def divide(
     cells: Cells,
     way: int,
     corner_vertex: NDArray[np.int32],
-    face_block: NDArray[np.int32],
+    vertex_block: NDArray[np.int32],
     listed: NDArray[np.int32],
 ) -> Blocks:
     """Divide the live faces.
@@ -78,11 +102,16 @@ def divide(
     cells : Cells
     way : {0, 1}
     corner_vertex : ndarray, shape (3 m,), int32
-    face_block, listed : ndarray, shape (m,), int32
-        Filled: the block of each face, and the live faces block by block.
+    vertex_block : ndarray, shape (n,), int32
+        Filled: the block that has all faces of each vertex.
+    listed : ndarray, shape (m,), int32
+        Filled: the live faces block by block.
     """
     of_faces, n_cells = cells.of_faces[way], cells.counts[way]
-    begin = kernels.blocks.fill_blocks(corner_vertex, of_faces, n_cells, FACES, face_block, listed)
+    sizes = cells.first[way], cells.least
+    begin = kernels.blocks.fill_blocks(
+        *(corner_vertex, of_faces, n_cells, sizes, vertex_block, listed)
+    )
     blocks = np.empty((len(begin) - 1, 4), np.int64)
     blocks[:, 0], blocks[:, 1] = begin[:-1], begin[1:]
     blocks[:, SPARE] = UNLIMITED

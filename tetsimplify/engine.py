@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tetsimplify import blocks, kernels
 from tetsimplify.crew import Crew
 from tetsimplify.data import VertexWeights
-from tetsimplify.locality import as_given, by_locality
+from tetsimplify.locality import Arrangement, as_given, by_locality
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
 from tetsimplify.start import start_quadrics, start_scratch, start_surface
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`, where there are no blocks
 LEAST_BLOCKS = 4  # a surface of fewer is not divided
-LEAST_BELOW_LENGTH = 512  # the same below one length: for fewer the order takes what threads earn
 LEAST_SPARE = 64  # faces a block on the average: with fewer to go the surface is not divided
 MOST_SWEEPS = 8  # over a block below one length, before its edges to others have their turn
 NOTHING = 1e-8  # of the diagonal: a quadric error or a length that is as good as none
@@ -48,6 +47,20 @@ class Result(NamedTuple):
     vertex_errors: NDArray[np.float64]
     """Shape (n,): root mean squared distance of each vertex from the planes of the faces that were
     merged into it; empty without quadrics."""
+
+
+def _arrange(mesh: Mesh, options: Options) -> tuple[Arrangement, blocks.Cells | None]:
+    """The order to work in, and the cells of blocks where the surface may be divided."""
+    can_divide = options.blocked != "violate" and options.intersections == "allow"
+    in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
+    least = LEAST_BLOCKS * (blocks.RUN if in_runs else blocks.FACES)
+    if not can_divide or len(mesh.faces) < least:
+        return as_given(mesh), None
+    cells = blocks.runs(mesh) if in_runs else None
+    if cells is not None:
+        return as_given(mesh), cells
+    arranged = by_locality(mesh)
+    return arranged, blocks.two_ways(arranged.mesh)
 
 
 class _Done(NamedTuple):
@@ -94,12 +107,7 @@ class Engine:
         threads: int | None = None,
     ) -> None:
         n, m = len(mesh.vertices), len(mesh.faces)
-        self._may_divide = (
-            m >= blocks.FACES * (LEAST_BELOW_LENGTH if options.has_one_threshold else LEAST_BLOCKS)
-            and options.blocked != "violate"
-            and options.intersections == "allow"
-        )
-        self._arranged = by_locality(mesh) if self._may_divide else as_given(mesh)
+        self._arranged, self._cells = _arrange(mesh, options)
         self._surface, self.topology_before = start_surface(mesh, self._arranged, options, locked)
         self._quadrics = None
         if options.uses_quadrics:
@@ -108,7 +116,6 @@ class Engine:
         self._cost = None if options.has_one_threshold else np.full(3 * m, np.inf, np.float32)
         self._face_origin = self._arranged.face_origin
         self._listed = np.arange(m, dtype=np.int32)
-        self._cells = blocks.two_ways(self._arranged.mesh) if self._may_divide else None
         self.options, self.rules = options, options.rules()
         self._outer = options.outer_code()
         self.min_faces = options.fewest_faces(m)
@@ -132,9 +139,10 @@ class Engine:
     @property
     def is_divided(self) -> bool:
         """Whether sweeps go over blocks, and leave what lies between them to the next one."""
-        n_blocks = self.n_faces // blocks.FACES
-        is_large = n_blocks >= LEAST_BLOCKS and self._n_spare >= LEAST_SPARE * n_blocks
-        return self._may_divide and is_large
+        if self._cells is None:
+            return False
+        n_blocks = self.n_faces // self._cells.least
+        return n_blocks >= LEAST_BLOCKS and self._n_spare >= LEAST_SPARE * n_blocks
 
     @property
     def _n_spare(self) -> int:
@@ -304,16 +312,18 @@ class Engine:
         assert self._cells is not None
         surface, way = self._surface, self.n_sweeps % 2
         all_blocks = blocks.divide(
-            self._cells, way, surface.corner_vertex, surface.face_block, self._listed
+            self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed
         )
         if self.topology_before.n_boundary_loops:
-            kernels.loops.find_loop_homes(surface)
+            kernels.loops.find_loop_homes(
+                surface.loop, surface.merged_into, surface.vertex_block, surface.loop_home
+            )
         return all_blocks
 
     def _unite(self) -> None:
         """Make one block of all faces again."""
         surface = self._surface
-        surface.face_block[:] = 0
+        surface.vertex_block[:] = 0
         self._listed = np.arange(len(self._face_origin), dtype=np.int32)
         if self.topology_before.n_boundary_loops:
             surface.loop_home[:] = 0
@@ -331,7 +341,9 @@ class Engine:
         Returns the number of contractions.
         """
         state, surface, scratch = kernels.state, self._surface, self._scratch
-        ends = all_blocks[blocks.AT_ONCE - 1 :: blocks.AT_ONCE, 1].tolist()
+        assert self._cells is not None
+        at_once = self._cells.at_once
+        ends = all_blocks[at_once - 1 :: at_once, 1].tolist()
         ends = [*ends, int(all_blocks[-1, 1])]
         room = max(end - begin for begin, end in pairwise([0, *ends]))
         idle: SimpleQueue[Scratch] = SimpleQueue()
@@ -358,7 +370,7 @@ class Engine:
 
         crew = Crew(self.n_threads, None if progress is None else tell)
         n_contracted = 0
-        for done in crew.share(do, len(all_blocks), blocks.AT_ONCE):
+        for done in crew.share(do, len(all_blocks), at_once):
             n_before = self.tally("N_SIMPLE") + self.tally("N_NESTED")
             n_contracted += len(done.merges)
             surface.merges[n_before : n_before + len(done.merges)] = done.merges
@@ -513,7 +525,6 @@ class Engine:
             corner_vertex=corner_vertex,
             next_corner=next_corner,
             face_state=face_state,
-            face_block=np.zeros(self.n_faces, np.int32),
             verdict=verdict,
         )
         self._scratch.face_mark.fill(0)

@@ -33,6 +33,7 @@ from tetsimplify.kernels.state import (
     N_NESTED,
     N_SIMPLE,
     N_SPARE,
+    OUTSIDE,
     PLACE,
     RANKED,
     SETTLED,
@@ -49,10 +50,12 @@ from tetsimplify.kernels.watch import follow, star_crosses
 def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 
-    NESTED when it does not; with ``blocked="violate"`` it does not matter.
+    NESTED when it does not, OUTSIDE when a face at it is in another block; with ``blocked="violate"`` it does not matter.
     """
     v = surface.corner_vertex[corner]
     u = surface.corner_vertex[ahead(corner)]
+    if surface.vertex_block[v] != scratch.tally[BLOCK] or surface.vertex_block[u] != scratch.tally[BLOCK]:
+        return OUTSIDE
     if surface.locked[v] and surface.locked[u]:
         return LOCKED
     n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)

@@ -22,13 +22,13 @@ DEAD = -1  # in corner_vertex: the face of this corner is gone
 @part
 def ahead(corner):
     """The corner that follows in the same face, counter-clockwise."""
-    return corner - 2 if corner % 3 == 2 else corner + 1
+    return corner - 2 if np.uint32(corner) % np.uint32(3) == 2 else corner + 1
 
 
 @part
 def behind(corner):
     """The corner that precedes in the same face."""
-    return corner + 2 if corner % 3 == 0 else corner - 1
+    return corner + 2 if np.uint32(corner) % np.uint32(3) == 0 else corner - 1
 
 
 @kernel

@@ -11,16 +11,13 @@ tetrahedron, or with the cone in a single triangle):
               b
 """
 
-from tetsimplify.kernels.blocks import GONE
 from tetsimplify.kernels.corners import DEAD, ahead, behind
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.state import (
-    BLOCK,
     CONTRACTIBLE,
     DOOMED,
     NESTED,
     OBSTRUCTED,
-    OUTSIDE,
     STAMP,
     STAR_U,
     STAR_V,
@@ -39,7 +36,7 @@ def gather_stars(surface, scratch, corner):
     n_v, n_u, n_doomed : int
         How many there are of each.
     n_common : int
-        Number of real common neighbours of v and u; -1 when a face is outside of the block.
+        Number of real common neighbours of v and u.
     """
     corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
     star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
@@ -48,25 +45,21 @@ def gather_stars(surface, scratch, corner):
     u = corner_vertex[ahead(corner)]
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
-    face_block, block = surface.face_block, scratch.tally[BLOCK]
 
     n_v = 0
     n_doomed = 0
     c = corner
     while True:
-        if face_block[c // 3] != block and face_block[c // 3] != GONE:
-            return 0, 0, 0, -1
         n = corner_vertex[ahead(c)]
         p = corner_vertex[behind(c)]
         if n != DEAD:
             mark[n] = stamp
             mark[p] = stamp
-            if n == u or p == u:
-                doomed[n_doomed] = c // 3
-                n_doomed += 1
-            else:
-                star_v[n_v] = c
-                n_v += 1
+            is_doomed = (n == u) | (p == u)
+            doomed[n_doomed] = c // 3
+            n_doomed += is_doomed
+            star_v[n_v] = c
+            n_v += 1 - is_doomed
         c = next_corner[c]
         if c == corner:
             break
@@ -76,20 +69,17 @@ def gather_stars(surface, scratch, corner):
     start = ahead(corner)
     c = start
     while True:
-        if face_block[c // 3] != block and face_block[c // 3] != GONE:
-            return 0, 0, 0, -1
         n = corner_vertex[ahead(c)]
         p = corner_vertex[behind(c)]
         if n != DEAD:
-            if mark[n] == stamp:
-                mark[n] = stamp - 1
-                n_common += 1
-            if mark[p] == stamp:
-                mark[p] = stamp - 1
-                n_common += 1
-            if n != v and p != v:
-                star_u[n_u] = c
-                n_u += 1
+            is_common = mark[n] == stamp
+            mark[n] -= is_common
+            n_common += is_common
+            is_common = mark[p] == stamp
+            mark[p] -= is_common
+            n_common += is_common
+            star_u[n_u] = c
+            n_u += (n != v) & (p != v)
         c = next_corner[c]
         if c == start:
             break
@@ -98,13 +88,11 @@ def gather_stars(surface, scratch, corner):
 
 @part
 def link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common):
-    """Whether a simple contraction is allowed: CONTRACTIBLE, NESTED, OBSTRUCTED or OUTSIDE.
+    """Whether a simple contraction is allowed: CONTRACTIBLE, NESTED or OBSTRUCTED.
 
     A boundary loop has to keep three edges. One that runs through several blocks does: each of
     the vertices between them stays, and so do the last two edges of a run between two of these.
     """
-    if n_common < 0:
-        return OUTSIDE
     loop_v, loop_u = surface.loop[v], surface.loop[u]
     if n_doomed == 1:  # a boundary edge
         is_long = surface.loop_home[loop_v] != block or surface.loop_size[loop_v] > 3

@@ -39,12 +39,12 @@ class Surface(NamedTuple):
     corner_vertex: np.ndarray  # int32 (3 m,): vertex of each corner, DEAD of a dead face
     next_corner: np.ndarray  # int32 (3 m,): circular lists of the corners of each vertex
     face_state: np.ndarray  # uint8 (m,)
-    face_block: np.ndarray  # int32 (m,): block of the face, GONE where it was dead before
     verdict: np.ndarray  # uint8 (3 m,): outcome for the edge from each corner, when last tried
+    vertex_block: np.ndarray  # int32 (n,): block that has all faces of the vertex, or SHARED
     merged_into: np.ndarray  # int32 (n,): vertex that this one was merged into, -1 when removed
     loop: np.ndarray  # int32 (n,): boundary loop of the vertex, -1 inside
     loop_size: np.ndarray  # int32 (n_loops,): edges of each boundary loop
-    loop_home: np.ndarray  # int32 (n_loops,): block that has all its edges, -1 for none
+    loop_home: np.ndarray  # int32 (n_loops,): block that has all faces at it, or SHARED
     locked: np.ndarray  # bool (n,): the vertex may neither move nor vanish
     merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
 
