@@ -126,9 +126,9 @@ def start_quadrics(
 
 def _aligned_rows(n: int, width: int) -> NDArray[np.float64]:
     """Zeros, with every row in as few lines of a cache as can be."""
-    line = CACHE_LINE // 8
-    memory = np.zeros(n * width + line)
-    first = -(memory.ctypes.data // 8) % line
+    line = CACHE_LINE // 4
+    memory = np.zeros(n * width + line, np.float32)
+    first = -(memory.ctypes.data // 4) % line
     return memory[first : first + n * width].reshape(n, width)
 
 

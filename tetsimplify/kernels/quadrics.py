@@ -37,9 +37,9 @@ MAX_REACH = 2.0
 @part
 def sum_at(terms, vertices, v, u):
     """The quadrics of v and u together, relative to v: A by rows of its upper half, b, c."""
-    axx, axy, axz = terms[u, 0], terms[u, 1], terms[u, 2]
-    ayy, ayz, azz = terms[u, 3], terms[u, 4], terms[u, 5]
-    bx, by, bz = terms[u, 6], terms[u, 7], terms[u, 8]
+    axx, axy, axz = np.float64(terms[u, 0]), np.float64(terms[u, 1]), np.float64(terms[u, 2])
+    ayy, ayz, azz = np.float64(terms[u, 3]), np.float64(terms[u, 4]), np.float64(terms[u, 5])
+    bx, by, bz = np.float64(terms[u, 6]), np.float64(terms[u, 7]), np.float64(terms[u, 8])
     dx = vertices[v, 0] - vertices[u, 0]
     dy = vertices[v, 1] - vertices[u, 1]
     dz = vertices[v, 2] - vertices[u, 2]
