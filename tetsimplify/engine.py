@@ -114,6 +114,7 @@ class Engine:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
             self._quadrics = start_quadrics(self._surface, options, arranged_bound)
         self._cost = None if options.has_one_threshold else np.full(3 * m, np.inf, np.float32)
+        self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
         self._listed = np.arange(m, dtype=np.int32)
         self.options, self.rules = options, options.rules()
@@ -224,9 +225,10 @@ class Engine:
     def rank(self) -> None:
         """Bring the costs of the edges up to date."""
 
+        bundles = self._surface, self._quadrics, self.rules, self._cost
+
         def task(part: slice) -> None:
-            bundles = self._surface, self._quadrics, self.rules, self._cost
-            kernels.cost.rank(*bundles, self._listed, part.start, part.stop)
+            kernels.cost.rank(*bundles, part.start, part.stop, 1)
 
         Crew(self.n_threads).share(task, len(self._face_origin), blocks.FACES * blocks.AT_ONCE)
 
@@ -263,7 +265,7 @@ class Engine:
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
             bundles = surface, self._quadrics, self._watch, scratch, self.rules
             lists = self._cost, thresholds, lenience, self._listed
-            return int(kernels.sweep.sweep_ranked(*bundles, *lists, some))
+            return int(kernels.sweep.sweep_ranked(*bundles, *lists, some, self._colour))
 
         if divided:
             all_blocks = self._divide()
@@ -279,7 +281,15 @@ class Engine:
         self._scratch.point[kernels.state.MAX_COST] = thresholds[-1]
         self._scratch.point[kernels.state.MAX_PRICE] = lenience * thresholds[-1]
         self.n_sweeps += 1
-        return n_contracted + self._unblock_deferred()
+        if len(thresholds) % 2 == 0:
+            self._change_colour()
+        n_contracted += self._unblock_deferred()
+        self._change_colour()
+        return n_contracted
+
+    def _change_colour(self) -> None:
+        """Take the other colour for the faces that are touched next, where costs are kept."""
+        self._colour = kernels.state.MOVED_EVEN + kernels.state.MOVED_ODD - self._colour
 
     def negligible_cost(self) -> float:
         """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
@@ -295,7 +305,10 @@ class Engine:
     def sample_of_costs(self) -> NDArray[np.float32]:
         """Costs of some of the edges that may be contracted, ascending."""
         assert self._cost is not None
-        step = max(1, len(self._face_origin) // SAMPLE)
+        n_faces = len(self._face_origin)
+        step = max(1, n_faces // SAMPLE)
+        bundles = self._surface, self._quadrics, self.rules, self._cost
+        kernels.cost.rank(*bundles, 0, n_faces, step)
         is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
         costs = self._cost.reshape(-1, 3)[::step][is_ranked]
         return np.sort(costs[costs < np.inf])
@@ -303,7 +316,8 @@ class Engine:
     def forget_refusals(self) -> None:
         """Let all edges be ranked and tried again."""
         state = kernels.state
-        self._surface.face_state[self._surface.face_state == state.RANKED] = state.STALE_ODD
+        untouched = state.STALE_ODD if self._colour == state.MOVED_EVEN else state.STALE_EVEN
+        self._surface.face_state[self._surface.face_state == state.RANKED] = untouched
 
     # --- threads ----------------------------------------------------------------------------------
 
@@ -493,7 +507,7 @@ class Engine:
         state = kernels.state
         bundles = self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost
         whole = blocks.whole(len(self._face_origin), self._n_spare)
-        colour = state.STALE_ODD if self._cost is None else state.MOVED
+        colour = state.STALE_ODD if self._cost is None else self._colour
         return int(kernels.sweep.unblock(*bundles, self._outer, whole, colour, commit))
 
     def compact_when_half(self) -> None:

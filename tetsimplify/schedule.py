@@ -63,11 +63,11 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
         n_barren = 0 if n_contracted else n_barren + 1
         if least == np.inf:
             if retry and n_barren:
-                return
+                break
             engine.forget_refusals()
             retry = True
         engine.compact_when_half()
-        engine.rank()
+    engine.rank()
 
 
 def is_near_end(engine: Engine) -> bool:

@@ -25,7 +25,8 @@ from tetsimplify.kernels.state import (
     INTERSECTION,
     LOCKED,
     MAX_PRICE,
-    MOVED,
+    MOVED_EVEN,
+    MOVED_ODD,
     N_LENS_FACES,
     N_LENS_VERTICES,
     N_LENSES,
@@ -37,6 +38,7 @@ from tetsimplify.kernels.state import (
     PLACE,
     RANKED,
     SETTLED,
+    STALE_EVEN,
     STALE_ODD,
     STAR_U,
     STAR_V,
@@ -192,7 +194,9 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
 @part
 def _touched(face_state, corner, colour):
     """The state of a face the vertex of whose corner has moved."""
-    if colour < MOVED:
+    if colour < MOVED_EVEN:
         return colour
-    state, moved = face_state[corner // 3], MOVED + corner % 3
-    return moved if state == RANKED or state == moved else STALE_ODD
+    state, k = face_state[corner // 3], corner % 3
+    if state == RANKED or state == MOVED_EVEN + k or state == MOVED_ODD + k:
+        return colour + k
+    return STALE_EVEN if colour == MOVED_EVEN else STALE_ODD

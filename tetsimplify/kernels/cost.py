@@ -4,14 +4,14 @@ import numpy as np
 
 from tetsimplify.kernels.corners import ahead
 from tetsimplify.kernels.geometry import squared_length
-from tetsimplify.kernels.jit import cold_part, kernel, kernel_in_place, part
+from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.quadrics import error_bound, increase, sum_at, weight
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
     ERROR_BOUND,
     LOCKED,
-    MOVED,
+    MOVED_EVEN,
     RANKED,
     SETTLED,
 )
@@ -67,37 +67,35 @@ def _ranked_cost(surface, quadrics, rules, a, b):
     return length2 if rules.by_length else increase(terms, a, b, error), CONTRACTIBLE
 
 
-@cold_part
-def rank_faces(surface, quadrics, rules, cost, listed, first, last):
-    """Bring the costs of the faces listed from `first` to `last` up to date.
+@part
+def rank_face(surface, quadrics, rules, cost, f):
+    """Bring the costs of the edges of a face up to date.
 
     Every edge is looked at from one face only, where it begins at its lower vertex. Its other
     corner has an infinite cost.
     """
-    for i in range(first, last):
-        f = listed[i]
-        state = surface.face_state[f]
-        if state == RANKED or state == SETTLED:
+    state = surface.face_state[f]
+    unchanged = (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1  # opposite of what moved
+    surface.face_state[f] = RANKED
+    for k in range(3):
+        if k == unchanged:
             continue
-        surface.face_state[f] = RANKED
-        opposite = (state - MOVED + 1) % 3 if state >= MOVED else -1  # which has not changed
-        for k in range(3):
-            if k == opposite:
-                continue
-            corner = 3 * f + k
-            a = surface.corner_vertex[corner]
-            b = surface.corner_vertex[ahead(corner)]
-            price, verdict = np.inf, CONTRACTIBLE
-            if is_ranked(surface.loop, a, b):
-                price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
-            cost[corner] = price
-            surface.verdict[corner] = verdict
+        corner = 3 * f + k
+        a = surface.corner_vertex[corner]
+        b = surface.corner_vertex[ahead(corner)]
+        price, verdict = np.inf, CONTRACTIBLE
+        if is_ranked(surface.loop, a, b):
+            price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
+        cost[corner] = price
+        surface.verdict[corner] = verdict
 
 
 @kernel_in_place
-def rank(surface, quadrics, rules, cost, listed, first, last):
-    """:func:`rank_faces`, for Python."""
-    rank_faces(surface, quadrics, rules, cost, listed, first, last)
+def rank(surface, quadrics, rules, cost, first, last, step):
+    """Bring the costs of every so many-th face up to date."""
+    for f in range(first, last, step):
+        if surface.face_state[f] != SETTLED and surface.face_state[f] != RANKED:
+            rank_face(surface, quadrics, rules, cost, f)
 
 
 @kernel

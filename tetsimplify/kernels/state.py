@@ -9,9 +9,9 @@ import numpy as np
 
 # States of a face. A sweep passes over settled faces, and over the faces that it has touched
 # itself: these carry its own colour and are its freeze; the next sweep has the other colour.
-# Where costs are kept, faces whose costs are up to date are RANKED, and only these are looked at;
-# of those with the state MOVED + k, the two edges at the k-th corner are to be ranked anew.
-SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED, MOVED = 0, 1, 2, 3, 4, 5
+# Where costs are kept, faces whose costs are up to date are RANKED; of those with the state
+# MOVED_... + k only the two edges at the k-th corner are to be ranked anew.
+SETTLED, BLOCKED, STALE_EVEN, STALE_ODD, RANKED, MOVED_EVEN, MOVED_ODD = 0, 1, 2, 3, 4, 5, 8
 
 # What becomes of an edge that is to be contracted. NESTED: the link condition blocks it. ENOUGH:
 # there would be fewer faces than asked for. TOO_DEAR: it costs more than the sweep allows. OUTSIDE:

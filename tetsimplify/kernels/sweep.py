@@ -10,7 +10,7 @@ import numpy as np
 
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import cheapest_first, edge_costs, rank_faces
+from tetsimplify.kernels.cost import cheapest_first, edge_costs, rank_face
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
 from tetsimplify.kernels.state import (
     BLOCK,
@@ -21,7 +21,8 @@ from tetsimplify.kernels.state import (
     ERROR_BOUND,
     MAX_COST,
     MAX_PRICE,
-    MOVED,
+    MOVED_EVEN,
+    MOVED_ODD,
     N_DEFERRED,
     N_SPARE,
     NESTED,
@@ -146,17 +147,17 @@ def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, 
 
 @kernel_in_place
 def sweep_ranked(
-    surface, quadrics, watch, scratch, rules, cost, thresholds, lenience, listed, blocks
+    surface, quadrics, watch, scratch, rules, cost, thresholds, lenience, listed, blocks, colour
 ):
     """Sweep over blocks with a threshold that grows: at most one edge of each face in each sweep.
 
-    An edge that is refused waits for a higher threshold: for what it costs at the place where it
+    The costs of a face are brought up to date when a sweep comes to it, unless it is frozen. An edge that is refused waits for a higher threshold: for what it costs at the place where it
     can be contracted, or for RAISE times the present one.
 
     Parameters
     ----------
     cost : float32 (3 m,)
-        Of the edge that begins at each corner; up to date.
+        Of the edge that begins at each corner.
     thresholds : float64 (n_sweeps,)
     lenience : float
         So many times the threshold an edge may cost together with the factor for the shapes.
@@ -164,6 +165,9 @@ def sweep_ranked(
         Faces, in the order in which they are looked at.
     blocks : int64 (k, 4)
         See :mod:`tetsimplify.blocks`.
+    colour : int
+        State that faces get when they are touched in the first sweep; MOVED_EVEN and MOVED_ODD in
+        turn.
 
     Returns
     -------
@@ -174,27 +178,30 @@ def sweep_ranked(
     for b in range(len(blocks)):
         first, last = _enter(scratch, blocks, b)
         for i in range(thresholds.size):
+            shade = colour if i % 2 == 0 else MOVED_EVEN + MOVED_ODD - colour
             scratch.point[MAX_COST] = thresholds[i]
             scratch.point[MAX_PRICE] = lenience * thresholds[i]
             is_last = i + 1 == thresholds.size
             n_contracted += _sweep_block_ranked(
-                surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last
+                surface, quadrics, watch, scratch, rules, cost, listed, first, last, shade, is_last
             )
-            rank_faces(surface, quadrics, rules, cost, listed, first, last)
     return n_contracted
 
 
 @inlined
 def _sweep_block_ranked(
-    surface, quadrics, watch, scratch, rules, cost, listed, first, last, is_last
+    surface, quadrics, watch, scratch, rules, cost, listed, first, last, colour, is_last
 ):
     """Sweep once over the faces listed; in the last sweep put off what is nested."""
     n_contracted = 0
     max_cost = scratch.point[MAX_COST]
     for i in range(first, last):
         f = listed[i]
-        if surface.face_state[f] != RANKED:
-            continue
+        state = surface.face_state[f]
+        if state != RANKED:
+            if state == SETTLED or _is_touched(state, colour):
+                continue
+            rank_face(surface, quadrics, rules, cost, f)
         if min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) >= max_cost:
             continue
         if scratch.tally[N_SPARE] < 2:
@@ -205,7 +212,7 @@ def _sweep_block_ranked(
             corner = 3 * f + k
             if cost[corner] >= max_cost:
                 break
-            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, MOVED)
+            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
                 is_nested = False
@@ -215,6 +222,13 @@ def _sweep_block_ranked(
         if is_nested and is_last:
             _defer(scratch, f)
     return n_contracted
+
+
+@part
+def _is_touched(state, colour):
+    """Whether a face has been touched in the sweep of a colour, where costs are kept."""
+    stale = STALE_EVEN if colour == MOVED_EVEN else STALE_ODD
+    return state == stale or (state >= colour and state < colour + 3)
 
 
 @part
