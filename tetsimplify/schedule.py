@@ -19,6 +19,7 @@ SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second ne
 NEAR_END = 2.0  # times the faces asked for are left
 LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: triangles that become
 LENIENT = 4.0  # worse have time to become better again
+SUCCESS, LEAST_SUCCESS = 0.5, 0.2  # part of the edges below a threshold that can be contracted
 N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
 
 
@@ -50,9 +51,10 @@ def _run_below_length(engine: Engine, progress: Progress | None) -> None:
 def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
     """Contract the cheapest edges first."""
     n_given, least, n_barren, retry = engine.n_faces, engine.negligible_cost(), 0, False
+    success = SUCCESS
     engine.rank()
     while not engine.has_enough:
-        thresholds = next_thresholds(engine, least, n_barren)
+        thresholds, n_below = next_thresholds(engine, least, n_barren, success)
         least = thresholds[-1]
         done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
         n_contracted = engine.sweep_ranked(
@@ -61,6 +63,7 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
             divided=engine.is_divided and not n_barren,
         )
         n_barren = 0 if n_contracted else n_barren + 1
+        success = min(max(n_contracted / n_below, LEAST_SUCCESS), 1.0)
         if least == np.inf:
             if retry and n_barren:
                 break
@@ -75,7 +78,9 @@ def is_near_end(engine: Engine) -> bool:
     return engine.n_faces <= NEAR_END * engine.min_faces
 
 
-def next_thresholds(engine: Engine, least: float, n_barren: int = 0) -> NDArray[np.float64]:
+def next_thresholds(
+    engine: Engine, least: float, n_barren: int = 0, success: float = 1.0
+) -> tuple[NDArray[np.float64], float]:
     """Costs that growing shares of the edges are below, and no more than have to go.
 
     Parameters
@@ -86,21 +91,28 @@ def next_thresholds(engine: Engine, least: float, n_barren: int = 0) -> NDArray[
         A threshold that is not gone below: that of the sweep before.
     n_barren : int
         The number of times before that nothing could be contracted.
+    success : float
+        The part of the edges below the last threshold that was contracted in the round before:
+        others vanish with those, become dearer, or are refused.
 
     Returns
     -------
-    ndarray, shape (k,), float64
+    thresholds : ndarray, shape (k,), float64
         One threshold for each sweep, ascending; infinite where all is to be tried.
+    n_below : float
+        About how many edges are below the last one.
     """
     costs = engine.sample_of_costs()
     n_faces, min_faces = engine.n_faces, engine.min_faces
     share = SHARES[is_near_end(engine)]
-    most = (n_faces - min_faces) / (3 * n_faces) if min_faces else 1.0
+    n_edges = 1.5 * n_faces
+    most = 0.5 * (n_faces - min_faces) / (success * n_edges) if min_faces else 1.0
     shares = 1.0 - (1.0 - share) ** np.arange(1, N_SWEEPS + 1)
     shares = np.unique(np.minimum(shares, most))
     shares = np.maximum(shares, 1.0 / max(1, len(costs))) * 2.0**n_barren
     if not len(costs) or shares[0] > 1.0:
-        return np.array([np.inf])
+        return np.array([np.inf]), n_edges
     last = len(costs) - 1
     cheap = costs[np.minimum((np.minimum(shares, 1.0) * len(costs)).astype(np.int64), last)]
-    return np.maximum(least, np.nextafter(cheap, np.float32(np.inf)).astype(np.float64))
+    thresholds = np.maximum(least, np.nextafter(cheap, np.float32(np.inf)).astype(np.float64))
+    return thresholds, min(shares[-1], 1.0) * n_edges
