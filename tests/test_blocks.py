@@ -15,7 +15,6 @@ from test_simplify import assert_maps_fit, assert_same_topology
 from tetsimplify import blocks, kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
-from tetsimplify.kernels.corners import DEAD
 from tetsimplify.locality import by_locality
 from tetsimplify.options import Options
 
@@ -26,10 +25,12 @@ OFF = {"foldover": None, "removal_limit": np.inf}
 def small_blocks(monkeypatch):
     """Blocks of so few faces that small meshes have many."""
     monkeypatch.setattr(blocks, "FACES", 120)
+    monkeypatch.setattr(blocks, "RUN", 120)
+    monkeypatch.setattr(blocks, "PART", 100)
+    monkeypatch.setattr(blocks, "MOST_SHARED", 1.0)
     monkeypatch.setattr(blocks, "CELL", 30)
     monkeypatch.setattr(blocks, "AT_ONCE", 4)
     monkeypatch.setattr("tetsimplify.engine.LEAST_SPARE", 1)
-    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
 
 
 def grid_of_tubes(n=70):
@@ -37,56 +38,81 @@ def grid_of_tubes(n=70):
     return tetsimplify.extract_isosurface(models.gyroid(n), 0.0, spacing=(4 * np.pi / n,) * 3)
 
 
-def engine_of(mesh, **options):
+def engine_of(mesh, threads=None, **options):
     vertices, faces = as_mesh(*mesh)
-    return Engine(as_mesh(vertices, faces), Options(**options), np.zeros(len(vertices), bool))
+    locked = np.zeros(len(vertices), bool)
+    return Engine(as_mesh(vertices, faces), Options(**options), locked, threads=threads)
 
 
 # --- dividing -------------------------------------------------------------------------------------
 
 
-def blocks_of_edges(engine):
-    """The blocks at the ends of every edge, from the lists of faces of its vertices."""
-    faces = engine.mesh().faces
+MODES_OF_DIVISION = ({"keep_ratio": 0.1}, {"max_edge_length": 1.0})  # along a curve, in runs
+
+
+def blocks_of_vertices(engine, divided):
+    """The blocks of the faces around every vertex, from the lists of faces alone."""
+    faces = engine._surface.corner_vertex.reshape(-1, 3)
     around = [set() for _ in range(len(engine._surface.vertices))]
-    place = engine._arranged.vertex_place
-    for face, block in zip(
-        faces, engine._surface.face_block[engine._surface.corner_vertex[::3] != DEAD], strict=True
-    ):
-        for v in place[face]:
+    for first, last, _, block in divided:
+        for v in faces[engine._listed[first:last]].flat:
             around[v].add(int(block))
     return around
 
 
-def test_every_face_is_in_one_block(small_blocks):
-    engine = engine_of(meshes.icosphere(3), max_edge_length=1.0)
+def is_between_blocks(engine):
+    """Which vertices have faces in several blocks."""
+    return np.array([len(some) > 1 for some in blocks_of_vertices(engine, engine._divide())])
+
+
+@pytest.mark.parametrize("mode", MODES_OF_DIVISION, ids=lambda mode: next(iter(mode)))
+@pytest.mark.parametrize("threads", (1, 3))
+def test_every_face_is_in_one_block(small_blocks, mode, threads):
+    engine = engine_of(meshes.icosphere(3), threads=threads, **mode)
+    in_runs = "max_edge_length" in mode
     for way in range(2):
         engine.n_sweeps = way
         divided = engine._divide()
         assert len(divided) > 8
         assert divided[0, 0] == 0 and divided[-1, 1] == engine.n_faces
         assert (divided[1:, 0] == divided[:-1, 1]).all()
-        assert (divided[:-1, 1] - divided[:-1, 0] >= blocks.FACES).all()
+        sizes = divided[:, 1] - divided[:, 0]
+        assert (sizes[1:-1] >= 120).all()
+        assert (60 <= sizes[0] < 120) if in_runs and way else sizes[0] >= 120
         listed = engine._listed[: engine.n_faces]
         assert np.array_equal(np.sort(listed), np.arange(engine.n_faces))
-        for first, last, _, number in divided:
-            assert (engine._surface.face_block[listed[first:last]] == number).all()
+        assert not in_runs or np.array_equal(listed, np.arange(engine.n_faces))
+        for of_vertex, around in zip(
+            engine._surface.vertex_block, blocks_of_vertices(engine, divided), strict=True
+        ):
+            assert {int(of_vertex)} == (around if len(around) == 1 else {kernels.blocks.SHARED})
 
 
-def test_what_lies_between_blocks_is_inside_of_those_of_the_other_way(monkeypatch):
+def test_what_lies_between_blocks_is_inside_of_those_of_the_other_way():
     """Where both ways have a border no edge can be contracted: only few may be there."""
-    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
     mesh = grid_of_tubes(80)
-    engine = engine_of(mesh, max_edge_length=1.0)
+    engine = engine_of(mesh, keep_ratio=0.1)
     borders = []
     for way in range(2):
         engine.n_sweeps = way
-        engine._divide()
-        n_blocks = np.array([len(some) for some in blocks_of_edges(engine)])
-        borders.append(n_blocks > 1)
+        borders.append(is_between_blocks(engine))
     assert 0.02 < borders[0].mean() < 0.2
     assert 0.02 < borders[1].mean() < 0.2
     assert (borders[0] & borders[1]).mean() < 0.02
+
+
+def test_faces_in_no_order_are_not_divided_in_runs(small_blocks, monkeypatch):
+    """Much would lie between runs of them; they are put in order, too."""
+    monkeypatch.setattr(blocks, "MOST_SHARED", 0.2)
+    monkeypatch.setattr(blocks, "RUN", 8000)
+    vertices, faces = grid_of_tubes(60)
+    shuffled = faces[np.random.default_rng(0).permutation(len(faces))]
+    assert engine_of((vertices, faces), max_edge_length=1.0)._arranged.is_as_given
+    assert not engine_of((vertices, shuffled), max_edge_length=1.0)._arranged.is_as_given
+    result = tetsimplify.simplify(vertices, shuffled, max_edge_length=0.4)
+    assert_maps_fit(vertices, shuffled, result)
+    assert len(result.faces) < 0.6 * len(faces)
+    assert_same_topology(shuffled, result)
 
 
 def test_shuffled_meshes_are_put_in_order(small_blocks):
@@ -163,6 +189,7 @@ def test_runs_side_by_side_make_no_difference(small_blocks):
 @pytest.mark.parametrize("seed", range(60))
 def test_topology_is_kept_and_nothing_contractible_is_left(small_blocks, monkeypatch, seed):
     monkeypatch.setattr(blocks, "FACES", 8)
+    monkeypatch.setattr(blocks, "RUN", 8)
     monkeypatch.setattr(blocks, "CELL", 2)
     vertices, faces = strategies.adversarial_mesh(seed)
     result = tetsimplify.simplify(vertices, faces, max_edge_length=1e6, threads=2, **OFF)
@@ -180,6 +207,7 @@ def test_topology_is_kept_and_nothing_contractible_is_left(small_blocks, monkeyp
 @pytest.mark.parametrize("block", range(10))
 def test_topology_is_kept_in_blocks_at_length(small_blocks, monkeypatch, block):
     monkeypatch.setattr(blocks, "FACES", 8)
+    monkeypatch.setattr(blocks, "RUN", 8)
     monkeypatch.setattr(blocks, "CELL", 2)
     for seed in range(block, 4_000, 10):
         vertices, faces = strategies.adversarial_mesh(seed)
@@ -214,7 +242,7 @@ def test_invariants_after_every_sweep_over_blocks(small_blocks):
         surface, live = engine._surface, engine.mesh()
         assert len(live.faces) == engine.n_faces
         assert naive.has_same_topology(before, naive.summary(live.faces))
-        assert (surface.face_block == 0).all() and (surface.loop_home == 0).all()
+        assert (surface.vertex_block == 0).all() and (surface.loop_home == 0).all()
         sizes = np.zeros_like(surface.loop_size)
         kernels.loops.count_loop_edges(surface.loop, surface.merged_into, sizes)
         assert np.array_equal(surface.loop_size, sizes)
@@ -229,14 +257,12 @@ def test_invariants_after_every_sweep_over_blocks(small_blocks):
 def test_no_seams_are_left_between_blocks(mode, monkeypatch):
     """Edges next to what was a border are as long as those inside."""
     monkeypatch.setattr(blocks, "FACES", 512)
+    monkeypatch.setattr(blocks, "RUN", 8192)
     monkeypatch.setattr(blocks, "CELL", 128)
-    monkeypatch.setattr("tetsimplify.engine.LEAST_BELOW_LENGTH", 4)
     mesh = grid_of_tubes(80)
     engine = engine_of(mesh, **mode)
-    engine._divide()
-    n_blocks = np.array([len(some) for some in blocks_of_edges(engine)])
-    was_border = n_blocks[engine._arranged.vertex_place] > 1
-    assert 0.1 < was_border.mean() < 0.4
+    was_border = is_between_blocks(engine)[engine._arranged.vertex_place]
+    assert 0.05 < was_border.mean() < 0.4
     result = tetsimplify.simplify(*mesh, **mode)
     at_border = np.zeros(len(result.vertices), bool)
     at_border[result.vertex_map[was_border]] = True

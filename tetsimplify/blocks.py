@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
+from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
 
 FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
 RUN = 2**16  # faces in a block of faces as they are given: few of so many are at its ends
 CELL = 2**10  # faces: blocks are made of cells of about so many
 AT_ONCE = 16  # blocks of FACES in a task for a thread
+PART = 2**17  # faces in a part, where what is done with them does not depend on the parts
 MOST_SHARED = 0.2  # of the vertices of runs may be between them
 UNLIMITED = 2**62  # faces that may go
 MOST_BITS = 7  # of the cells along an axis
@@ -47,44 +49,72 @@ class Cells(NamedTuple):
     """Blocks in a task for a thread."""
 
 
-def two_ways(mesh: Mesh) -> Cells:
+def two_ways(mesh: Mesh, crew: Crew) -> Cells:
     """Cells of a mesh whose faces are in the order of a Z-order curve.
 
     In the first way they follow that order, in the second one they are those of a shifted curve.
     """
     m = len(mesh.faces)
-    by_order = (np.arange(m) // CELL).astype(np.int32)
     low, high = kernels.order.bounds(mesh.vertices)
     extent = float((high - low).max())
     bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / CELL))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
-    shifted, n_shifted = kernels.order.morton_cells(
-        mesh.vertices, mesh.faces, low - SHIFT * extent, scale, 2**bits - 1
-    )
-    return Cells((by_order, shifted), (m // CELL + 1, n_shifted), FACES, (FACES, FACES), AT_ONCE)
+    curve = low - SHIFT * extent, scale, 2**bits - 1
+    shifted, number = np.empty(m, np.int32), np.zeros(2 ** (3 * bits), np.int32)
+
+    def find(part: slice) -> None:
+        kernels.order.find_cells(*mesh, *curve, part.start, part.stop, shifted, number)
+
+    def renumber(part: slice) -> None:
+        kernels.order.renumber(number, part.start, part.stop, shifted)
+
+    crew.share(find, m, PART)
+    n_shifted = int(kernels.order.number_cells(number))
+    crew.share(renumber, m, PART)
+    counts = m // CELL + 1, n_shifted
+    return Cells((_by_order(m), shifted), counts, FACES, (FACES, FACES), AT_ONCE)
 
 
-def runs(mesh: Mesh) -> Cells | None:
+def runs(mesh: Mesh, crew: Crew) -> Cells | None:
     """Cells of a mesh as it is given: its blocks are runs of faces, which are shifted by half.
 
     None where faces that follow one another lie apart, so that much would be between the runs.
     """
     m = len(mesh.faces)
-    by_order = (np.arange(m) // CELL).astype(np.int32)
-    n_cells = m // CELL + 1
+    by_order, n_cells = _by_order(m), m // CELL + 1
     cells = Cells((by_order, by_order), (n_cells, n_cells), RUN, (RUN, RUN // 2), 1)
-    block_of = np.empty(len(mesh.vertices), np.int32)
-    listed = np.empty(m, np.int32)
-    divide(cells, 0, mesh.faces.reshape(-1), block_of, listed)
-    n_shared = np.count_nonzero(block_of == kernels.blocks.SHARED)
-    return cells if n_shared <= MOST_SHARED * len(block_of) else None
+    vertex_block = np.zeros(len(mesh.vertices), np.int32)
+    divide(cells, 0, mesh.faces.reshape(-1), vertex_block, np.empty(m, np.int32), crew)
+    n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
+    return cells if n_shared <= MOST_SHARED * len(vertex_block) else None
 
 
-def copy_live(cells: Cells, corner_vertex: NDArray[np.int32], n_live: int) -> Cells:
-    """The cells of the faces that are live."""
-    live = np.empty((2, n_live), np.int32)
-    for way in range(2):
-        kernels.blocks.copy_cells(corner_vertex, cells.of_faces[way], live[way])
+def _by_order(n_faces: int) -> NDArray[np.int32]:
+    """Cells of faces that follow one another."""
+    return np.repeat(np.arange(n_faces // CELL + 1, dtype=np.int32), CELL)[:n_faces]
+
+
+def copy_live(
+    cells: Cells, corner_vertex: NDArray[np.int32], begin: NDArray[np.int64], crew: Crew
+) -> Cells:
+    """The cells of the faces that are live.
+
+    Parameters
+    ----------
+    begin : ndarray, shape (n_parts + 1,), int64
+        Where the live faces of each part of PART faces begin.
+    """
+    live = np.empty((2, begin[-1]), np.int32)
+
+    def copy(part: slice) -> None:
+        at = begin[part.start // PART]
+        for way in range(2):
+            of_faces = cells.of_faces[way]
+            kernels.blocks.copy_cells(
+                corner_vertex, of_faces, part.start, part.stop, at, live[way]
+            )
+
+    crew.share(copy, len(corner_vertex) // 3, PART)
     return cells._replace(of_faces=(live[0], live[1]))
 
 
@@ -94,6 +124,7 @@ def divide(
     corner_vertex: NDArray[np.int32],
     vertex_block: NDArray[np.int32],
     listed: NDArray[np.int32],
+    crew: Crew,
 ) -> Blocks:
     """Divide the live faces.
 
@@ -106,16 +137,39 @@ def divide(
         Filled: the block that has all faces of each vertex.
     listed : ndarray, shape (m,), int32
         Filled: the live faces block by block.
+    crew : Crew
     """
     of_faces, n_cells = cells.of_faces[way], cells.counts[way]
+    m = len(of_faces)
+    n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
+    block_of, begin = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
+    place = np.empty_like(n_faces)
+
+    def count(part: slice) -> None:
+        row = n_faces[part.start // PART]
+        kernels.blocks.count_live(corner_vertex, of_faces, part.start, part.stop, row)
+
+    def put(part: slice) -> None:
+        row = place[part.start // PART]
+        kernels.blocks.list_faces(
+            *(corner_vertex, of_faces, block_of, part.start, part.stop, row, vertex_block, listed)
+        )
+
+    def find_shared(part: slice) -> None:
+        kernels.blocks.find_shared(
+            corner_vertex, of_faces, block_of, part.start, part.stop, vertex_block
+        )
+
+    crew.share(count, m, PART)
     sizes = cells.first[way], cells.least
-    begin = kernels.blocks.fill_blocks(
-        *(corner_vertex, of_faces, n_cells, sizes, vertex_block, listed)
-    )
-    blocks = np.empty((len(begin) - 1, 4), np.int64)
-    blocks[:, 0], blocks[:, 1] = begin[:-1], begin[1:]
+    n_blocks = kernels.blocks.put_in_blocks(n_faces, sizes, block_of, place, begin)
+    crew.share(put, m, PART)
+    crew.share(find_shared, m, PART)
+
+    blocks = np.empty((n_blocks, 4), np.int64)
+    blocks[:, 0], blocks[:, 1] = begin[:n_blocks], begin[1 : n_blocks + 1]
     blocks[:, SPARE] = UNLIMITED
-    blocks[:, 3] = np.arange(len(blocks))
+    blocks[:, 3] = np.arange(n_blocks)
     return blocks
 
 

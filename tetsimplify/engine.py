@@ -49,18 +49,18 @@ class Result(NamedTuple):
     merged into it; empty without quadrics."""
 
 
-def _arrange(mesh: Mesh, options: Options) -> tuple[Arrangement, blocks.Cells | None]:
+def _arrange(mesh: Mesh, options: Options, crew: Crew) -> tuple[Arrangement, blocks.Cells | None]:
     """The order to work in, and the cells of blocks where the surface may be divided."""
     can_divide = options.blocked != "violate" and options.intersections == "allow"
     in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
     least = LEAST_BLOCKS * (blocks.RUN if in_runs else blocks.FACES)
     if not can_divide or len(mesh.faces) < least:
         return as_given(mesh), None
-    cells = blocks.runs(mesh) if in_runs else None
+    cells = blocks.runs(mesh, crew) if in_runs else None
     if cells is not None:
         return as_given(mesh), cells
     arranged = by_locality(mesh)
-    return arranged, blocks.two_ways(arranged.mesh)
+    return arranged, blocks.two_ways(arranged.mesh, crew)
 
 
 class _Done(NamedTuple):
@@ -107,7 +107,9 @@ class Engine:
         threads: int | None = None,
     ) -> None:
         n, m = len(mesh.vertices), len(mesh.faces)
-        self._arranged, self._cells = _arrange(mesh, options)
+        self._crew = Crew(threads)
+        self.n_threads = self._crew.n_threads
+        self._arranged, self._cells = _arrange(mesh, options, self._crew)
         self._surface, self.topology_before = start_surface(mesh, self._arranged, options, locked)
         self._quadrics = None
         if options.uses_quadrics:
@@ -125,7 +127,6 @@ class Engine:
         n_coned = n + self.topology_before.n_boundary_loops
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
-        self.n_threads = Crew(threads).n_threads
 
     @property
     def n_faces(self) -> int:
@@ -230,7 +231,7 @@ class Engine:
         def task(part: slice) -> None:
             kernels.cost.rank(*bundles, part.start, part.stop, 1)
 
-        Crew(self.n_threads).share(task, len(self._face_origin), blocks.FACES * blocks.AT_ONCE)
+        self._crew.share(task, len(self._face_origin), blocks.PART)
 
     def sweep_ranked(
         self,
@@ -326,7 +327,7 @@ class Engine:
         assert self._cells is not None
         surface, way = self._surface, self.n_sweeps % 2
         all_blocks = blocks.divide(
-            self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed
+            self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed, self._crew
         )
         if self.topology_before.n_boundary_loops:
             kernels.loops.find_loop_homes(
@@ -419,8 +420,8 @@ class Engine:
         edges, reasons = self._remaining_edges()
         self._compact()
         surface, place = self._surface, self._arranged.vertex_place
-        order = np.argsort(self._face_origin)
-        faces = surface.corner_vertex.reshape(-1, 3)[order]
+        order = self._order_given()
+        faces = surface.corner_vertex.reshape(-1, 3)[order].copy()
         number = np.empty(len(surface.merged_into), np.int32)
         merged_into = surface.merged_into.copy()  # whose paths are shortened
         n_used = kernels.result.number_vertices(surface.corner_vertex, place, merged_into, number)
@@ -434,6 +435,15 @@ class Engine:
             *(vertices, faces, number[place], self._face_origin[order], number[edges], reasons),
             *(shortest, stop, self._vertex_errors(number)),
         )
+
+    def _order_given(self) -> NDArray[np.int32] | slice:
+        """The live faces in the order in which they were given."""
+        origin = self._face_origin
+        if self._arranged.is_as_given:
+            return slice(None)
+        place = np.full(len(self._arranged.face_origin), -1, np.int32)
+        place[origin] = np.arange(len(origin), dtype=np.int32)
+        return place[place >= 0]
 
     def _vertex_errors(self, number: NDArray[np.int32]) -> NDArray[np.float64]:
         """The quadric errors of the vertices that are left, as distances."""
@@ -518,23 +528,28 @@ class Engine:
 
     def _compact(self) -> None:
         """Drop the dead faces."""
-        corner_vertex = np.empty(3 * self.n_faces, np.int32)
-        face_state = np.empty(self.n_faces, np.uint8)
-        verdict = np.empty(3 * self.n_faces, np.uint8)
-        origin = np.empty(self.n_faces, np.int32)
-        surface = self._surface
-        if self._cost is not None:
-            live = surface.corner_vertex[::3] != kernels.corners.DEAD
-            self._cost = self._cost.reshape(-1, 3)[live].reshape(-1)
-        kernels.result.copy_live_faces(
-            *(surface.corner_vertex, surface.face_state, surface.verdict, self._face_origin),
-            *(corner_vertex, face_state, verdict, origin),
-        )
-        next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
+        surface, crew, m = self._surface, self._crew, len(self._face_origin)
+        counts = crew.share(self._count_live, m, blocks.PART)
+        begin = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+        n_live = int(begin[-1])
+        corner_vertex = np.empty(3 * n_live, np.int32)
+        face_state, verdict = np.empty(n_live, np.uint8), np.empty(3 * n_live, np.uint8)
+        cost = None if self._cost is None else np.empty(3 * n_live, np.float32)
+        origin = np.empty(n_live, np.int32)
+
+        def copy(part: slice) -> None:
+            kernels.result.copy_live_faces(
+                *(surface, self._cost, self._face_origin, part.start, part.stop),
+                *(begin[part.start // blocks.PART], corner_vertex, face_state, verdict, cost),
+                origin,
+            )
+
+        crew.share(copy, m, blocks.PART)
         if self._cells is not None:
-            self._cells = blocks.copy_live(self._cells, surface.corner_vertex, self.n_faces)
-        self._face_origin = origin
-        self._listed = np.arange(self.n_faces, dtype=np.int32)
+            self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
+        next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
+        self._cost, self._face_origin = cost, origin
+        self._listed = np.arange(n_live, dtype=np.int32)
         self._surface = surface._replace(
             corner_vertex=corner_vertex,
             next_corner=next_corner,
@@ -542,3 +557,7 @@ class Engine:
             verdict=verdict,
         )
         self._scratch.face_mark.fill(0)
+
+    def _count_live(self, part: slice) -> int:
+        corner_vertex = self._surface.corner_vertex
+        return int(kernels.result.count_live_faces(corner_vertex, part.start, part.stop))

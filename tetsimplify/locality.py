@@ -22,6 +22,11 @@ class Arrangement(NamedTuple):
     face_origin: NDArray[np.int32]
     """Shape (m,): number of each face in the mesh given."""
 
+    @property
+    def is_as_given(self) -> bool:
+        """Whether the order is that of the mesh given."""
+        return self.vertex_origin is self.vertex_place
+
 
 def as_given(mesh: Mesh) -> Arrangement:
     """The order of the mesh itself; its arrays are copied."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.jit import kernel, kernel_in_place, part
+from tetsimplify.kernels.jit import kernel_in_place, part
 
 SHARED = -1  # no block has all faces of the vertex
 UNSEEN = -2  # no face of the vertex yet
@@ -15,58 +15,80 @@ def joined(known, block):
     return block if known == UNSEEN or known == block else SHARED
 
 
-@kernel
-def fill_blocks(corner_vertex, cell, n_cells, least, vertex_block, listed):
-    """Put neighbouring cells together to blocks of at least so many live faces, but for the last.
+@kernel_in_place
+def count_live(corner_vertex, cell, first, last, n_faces):
+    """Count the live ones of the faces from `first` to `last` in each cell."""
+    for f in range(first, last):
+        if corner_vertex[3 * f] != DEAD:
+            n_faces[cell[f]] += 1
+
+
+@kernel_in_place
+def put_in_blocks(n_faces, least, block_of, place, begin):
+    """Put neighbouring cells together to blocks of at least so many faces, but for the last.
 
     Parameters
     ----------
-    cell : int32 (m,)
-        Cell of each face.
+    n_faces : int32 (n_parts, n_cells)
+        Live faces of each cell that each part of the faces has.
     least : int, int
         Faces in the first block and in each of the others.
-    vertex_block : int32 (n,), out
-        The block that has all faces of each vertex, SHARED where there are several.
-    listed : int32 (m,), out
-        The live faces, block by block.
+    block_of : int32 (n_cells,), out
+    place : int32 (n_parts, n_cells), out
+        Where each part lists its faces of each block, in the column of the number of the block.
+    begin : int32 (n_cells + 1,), out
+        Where the faces of each block begin in the list.
 
     Returns
     -------
-    int64 (n_blocks + 1,)
-        Where the faces of each block begin in `listed`.
+    int
+        Number of blocks.
     """
-    n_faces = np.zeros(n_cells, np.int32)
-    for f in range(cell.size):
-        if corner_vertex[3 * f] != DEAD:
-            n_faces[cell[f]] += 1
-    block_of = np.empty(n_cells, np.int32)
-    begin = np.zeros(n_cells + 1, np.int64)
-    n_blocks, filled = 0, 0
-    for c in range(n_cells):
+    n_blocks, n_listed, first, filled = 0, 0, 0, 0
+    for c in range(block_of.size):
         block_of[c] = n_blocks
-        filled += n_faces[c]
-        if filled >= least[min(n_blocks, 1)] or c + 1 == n_cells:
-            begin[n_blocks + 1] = begin[n_blocks] + filled
-            n_blocks += 1
-            filled = 0
-    place = begin[:n_blocks].copy()
-    vertex_block[:] = UNSEEN
-    for f in range(cell.size):
+        for part in range(len(n_faces)):
+            filled += n_faces[part, c]
+        if filled < least[min(n_blocks, 1)] and c + 1 < block_of.size:
+            continue
+        begin[n_blocks] = n_listed
+        for part in range(len(n_faces)):
+            place[part, n_blocks] = n_listed
+            for d in range(first, c + 1):
+                n_listed += n_faces[part, d]
+        n_blocks += 1
+        first, filled = c + 1, 0
+    begin[n_blocks] = n_listed
+    return n_blocks
+
+
+@kernel_in_place
+def list_faces(corner_vertex, cell, block_of, first, last, place, vertex_block, listed):
+    """List live faces block by block, and note a block of each vertex: any of those it is in."""
+    for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
             block = block_of[cell[f]]
             listed[place[block]] = f
             place[block] += 1
-            for k in range(3):
-                v = corner_vertex[3 * f + k]
-                vertex_block[v] = joined(vertex_block[v], block)
-    return begin[: n_blocks + 1]
+            for corner in range(3 * f, 3 * f + 3):
+                vertex_block[corner_vertex[corner]] = block
 
 
 @kernel_in_place
-def copy_cells(corner_vertex, cell, to):
-    """Copy the cells of the live faces, in order."""
-    n = 0
-    for f in range(cell.size):
+def find_shared(corner_vertex, cell, block_of, first, last, vertex_block):
+    """Find the vertices that have faces in another block than the one noted."""
+    for f in range(first, last):
+        if corner_vertex[3 * f] != DEAD:
+            block = block_of[cell[f]]
+            for corner in range(3 * f, 3 * f + 3):
+                if vertex_block[corner_vertex[corner]] != block:
+                    vertex_block[corner_vertex[corner]] = SHARED
+
+
+@kernel_in_place
+def copy_cells(corner_vertex, cell, first, last, n, to):
+    """Copy the cells of the live faces from `first` to `last`, in order, from place `n` on."""
+    for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
             to[n] = cell[f]
             n += 1

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetsimplify.kernels.jit import kernel, part
+from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 
 N_CELLS = 2**10  # along an axis, for the order of the vertices
 
@@ -74,9 +74,9 @@ def sort_vertices(vertices, low, scale):
     return order
 
 
-@kernel
-def morton_cells(vertices, faces, low, scale, most):
-    """Number the cells of a Z-order curve that first corners of faces lie in.
+@kernel_in_place
+def find_cells(vertices, faces, low, scale, most, first, last, cell, is_used):
+    """Find the cells of a Z-order curve that the first corners of faces lie in.
 
     Parameters
     ----------
@@ -84,26 +84,35 @@ def morton_cells(vertices, faces, low, scale, most):
         As of :func:`sort_vertices`.
     most : int
         Number of the last cell along an axis.
-
-    Returns
-    -------
-    cell : int32 (m,)
-        Of each face.
-    n_cells : int
+    first, last : int
+        Which faces.
+    cell : int32 (m,), out
+        Of each face, numbered along the curve.
+    is_used : int32 (n,), out
+        1 for these cells.
     """
-    number = np.zeros((most + 1) ** 3, np.int32)
-    cell = np.empty(len(faces), np.int32)
-    for f in range(len(faces)):
-        cell[f] = _morton(vertices, faces[f, 0], low, scale, most)
-        number[cell[f]] = 1
-    n_cells = 0
-    for code in range(number.size):
-        if number[code] > 0:
-            number[code] = n_cells
-            n_cells += 1
-    for f in range(len(faces)):
+    for f in range(first, last):
+        code = _morton(vertices, faces[f, 0], low, scale, most)
+        cell[f] = code
+        is_used[code] = 1
+
+
+@kernel_in_place
+def number_cells(is_used):
+    """Number the cells in use instead of marking them; return how many there are."""
+    n = 0
+    for code in range(is_used.size):
+        if is_used[code] > 0:
+            is_used[code] = n
+            n += 1
+    return n
+
+
+@kernel_in_place
+def renumber(number, first, last, cell):
+    """Give the cells of faces their numbers."""
+    for f in range(first, last):
         cell[f] = number[cell[f]]
-    return cell, n_cells
 
 
 @kernel

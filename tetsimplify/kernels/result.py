@@ -8,17 +8,38 @@ from tetsimplify.kernels.jit import kernel_in_place
 
 
 @kernel_in_place
-def copy_live_faces(corner_vertex, state, verdict, origin, to_corner, to_state, to_verdict, to):
-    """Copy the live faces with their states, verdicts and origins, in order."""
+def count_live_faces(corner_vertex, first, last):
+    """Count the live ones of the faces from `first` to `last`."""
     n = 0
-    for f in range(state.size):
-        if corner_vertex[3 * f] == DEAD:
+    for f in range(first, last):
+        n += corner_vertex[3 * f] != DEAD
+    return n
+
+
+@kernel_in_place
+def copy_live_faces(
+    surface, cost, origin, first, last, n, to_corner, to_state, to_verdict, to_cost, to_origin
+):
+    """Copy the live faces from `first` to `last` with all that goes with them, from place n on.
+
+    Parameters
+    ----------
+    surface : Surface
+    cost : float32 (3 m,) or None
+        Where costs are kept.
+    origin : int32 (m,)
+    first, last, n : int
+    """
+    for f in range(first, last):
+        if surface.corner_vertex[3 * f] == DEAD:
             continue
         for k in range(3):
-            to_corner[3 * n + k] = corner_vertex[3 * f + k]
-            to_verdict[3 * n + k] = verdict[3 * f + k]
-        to_state[n] = state[f]
-        to[n] = origin[f]
+            to_corner[3 * n + k] = surface.corner_vertex[3 * f + k]
+            to_verdict[3 * n + k] = surface.verdict[3 * f + k]
+            if cost is not None:
+                to_cost[3 * n + k] = cost[3 * f + k]
+        to_state[n] = surface.face_state[f]
+        to_origin[n] = origin[f]
         n += 1
 
 
