@@ -155,7 +155,7 @@ def test_errors_of_the_result_are_those_of_the_planes_merged():
         assert engine.tally("N_NESTED") == 0
         expected = naive_quadrics.rms_errors(vertices, faces, engine.result)
         assert expected.max() > 0.01
-        assert np.allclose(engine.result.vertex_errors, expected, rtol=1e-6, atol=1e-9)
+        assert np.allclose(engine.result.vertex_errors, expected, rtol=1e-4, atol=1e-9)
 
 
 # --- topology, in every mode ----------------------------------------------------------------------
@@ -223,7 +223,7 @@ def test_invariants_after_every_sweep(cost, blocked):
         threshold, n_barren = 0.0, 0
         for _ in range(400):
             engine.rank()
-            thresholds = next_thresholds(engine, threshold, n_barren)
+            thresholds = next_thresholds(engine, threshold, n_barren).thresholds
             threshold = thresholds[-1]
             n_before = engine.n_faces
             n_contracted = engine.sweep_ranked(thresholds)

@@ -451,7 +451,7 @@ class Engine:
             return np.empty(0)
         place, is_used = self._arranged.vertex_place, number >= 0
         is_left = (self._surface.merged_into == np.arange(len(number))) & is_used
-        terms = self._quadrics[place[is_left[place]]]
+        terms = self._quadrics[place[is_left[place]]].astype(np.float64)
         weight = terms[:, 0] + terms[:, 3] + terms[:, 5]
         errors: NDArray[np.float64] = np.sqrt(terms[:, 9] / np.where(weight > 0.0, weight, 1.0))
         return errors

@@ -8,6 +8,8 @@ for a queue.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,15 @@ LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: t
 LENIENT = 4.0  # worse have time to become better again
 SUCCESS, LEAST_SUCCESS = 0.5, 0.2  # part of the edges below a threshold that can be contracted
 N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
+
+
+class Round(NamedTuple):
+    """What is swept for before costs are compared over the whole surface again."""
+
+    thresholds: NDArray[np.float64]
+    """Shape (k,): one for each sweep, ascending; infinite where all is to be tried."""
+    n_below: float
+    """About how many edges are below the last one."""
 
 
 def run(engine: Engine, progress: Progress | None = None) -> None:
@@ -80,7 +91,7 @@ def is_near_end(engine: Engine) -> bool:
 
 def next_thresholds(
     engine: Engine, least: float, n_barren: int = 0, success: float = 1.0
-) -> tuple[NDArray[np.float64], float]:
+) -> Round:
     """Costs that growing shares of the edges are below, and no more than have to go.
 
     Parameters
@@ -97,10 +108,7 @@ def next_thresholds(
 
     Returns
     -------
-    thresholds : ndarray, shape (k,), float64
-        One threshold for each sweep, ascending; infinite where all is to be tried.
-    n_below : float
-        About how many edges are below the last one.
+    Round
     """
     costs = engine.sample_of_costs()
     n_faces, min_faces = engine.n_faces, engine.min_faces
@@ -111,8 +119,8 @@ def next_thresholds(
     shares = np.unique(np.minimum(shares, most))
     shares = np.maximum(shares, 1.0 / max(1, len(costs))) * 2.0**n_barren
     if not len(costs) or shares[0] > 1.0:
-        return np.array([np.inf]), n_edges
+        return Round(np.array([np.inf]), n_edges)
     last = len(costs) - 1
     cheap = costs[np.minimum((np.minimum(shares, 1.0) * len(costs)).astype(np.int64), last)]
     thresholds = np.maximum(least, np.nextafter(cheap, np.float32(np.inf)).astype(np.float64))
-    return thresholds, min(shares[-1], 1.0) * n_edges
+    return Round(thresholds, min(shares[-1], 1.0) * n_edges)
