@@ -62,7 +62,7 @@ def contract(
     with clock.stage("report"):
         weights = engine.vertex_weights() if vertex_data else None
         result = engine.result
-        after = topology(result.vertices, result.faces)
+        after = topology(result.vertices, result.faces, threads=engine.n_threads)
 
     report = SimplificationReport(
         options=options,

@@ -110,7 +110,9 @@ class Engine:
         self._crew = Crew(threads)
         self.n_threads = self._crew.n_threads
         self._arranged, self._cells = _arrange(mesh, options, self._crew)
-        self._surface, self.topology_before = start_surface(mesh, self._arranged, options, locked)
+        self._surface, self.topology_before = start_surface(
+            *(mesh, self._arranged, options, locked, self.n_threads)
+        )
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
