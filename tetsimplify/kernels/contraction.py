@@ -6,7 +6,7 @@ the new vertex get the state `colour`.
 
 import numpy as np
 
-from tetsimplify.kernels.corners import DEAD, ahead
+from tetsimplify.kernels.corners import DEAD, ahead, face_of
 from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition
@@ -188,7 +188,7 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
     n = n_v + n_u
     for i in range(n):
         surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
-        surface.face_state[star[i] // 3] = _touched(surface.face_state, star[i], colour)
+        surface.face_state[face_of(star[i])] = _touched(surface.face_state, star[i], colour)
 
 
 @part
@@ -196,7 +196,8 @@ def _touched(face_state, corner, colour):
     """The state of a face the vertex of whose corner has moved."""
     if colour < MOVED_EVEN:
         return colour
-    state, k = face_state[corner // 3], corner % 3
+    f = face_of(corner)
+    state, k = face_state[f], corner - 3 * f
     if state == RANKED or state == MOVED_EVEN + k or state == MOVED_ODD + k:
         return colour + k
     return STALE_EVEN if colour == MOVED_EVEN else STALE_ODD

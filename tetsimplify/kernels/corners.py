@@ -40,6 +40,29 @@ def others(corner_vertex, corner):
     return a, corner_vertex[first + 2 * (k == 0) + (k == 2)]
 
 
+@part
+def vertex_ahead(corner_vertex, corner):
+    """The vertex of the corner that follows in the same face.
+
+    Unsigned, as it spares the machine the question whether an index counts from the end.
+    """
+    c = np.uint32(corner)
+    return corner_vertex[c - np.uint32(2) if c % np.uint32(3) == 2 else c + np.uint32(1)]
+
+
+@part
+def vertex_behind(corner_vertex, corner):
+    """The vertex of the corner that precedes in the same face."""
+    c = np.uint32(corner)
+    return corner_vertex[c + np.uint32(2) if c % np.uint32(3) == 0 else c - np.uint32(1)]
+
+
+@part
+def face_of(corner):
+    """The face of a corner."""
+    return np.int64(np.uint32(corner) // np.uint32(3))
+
+
 @kernel
 def link_corners(corner_vertex, n_vertices):
     """Link the live corners of each vertex into a circular list.

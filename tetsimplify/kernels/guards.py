@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead, behind
+from tetsimplify.kernels.corners import vertex_ahead, vertex_behind
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.quadrics import AREA, NORMAL
 from tetsimplify.kernels.state import (
@@ -30,8 +30,8 @@ def turns_over(vertices, corner_vertex, star, n, v, point, cos_foldover):
     px, py, pz = point[0], point[1], point[2]
     ox, oy, oz = vertices[v, 0] - px, vertices[v, 1] - py, vertices[v, 2] - pz
     for i in range(n):
-        a = corner_vertex[ahead(star[i])]
-        b = corner_vertex[behind(star[i])]
+        a = np.uint32(vertex_ahead(corner_vertex, star[i]))
+        b = np.uint32(vertex_behind(corner_vertex, star[i]))
         ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
         bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
         new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -80,8 +80,8 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
         star = scratch.lists[STAR_V + side]
         ox, oy, oz = vertices[w, 0] - px, vertices[w, 1] - py, vertices[w, 2] - pz
         for i in range(n):
-            a = corner_vertex[ahead(star[i])]
-            b = corner_vertex[behind(star[i])]
+            a = np.uint32(vertex_ahead(corner_vertex, star[i]))
+            b = np.uint32(vertex_behind(corner_vertex, star[i]))
             ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
             bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
             new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -11,7 +11,9 @@ tetrahedron, or with the cone in a single triangle):
               b
 """
 
-from tetsimplify.kernels.corners import DEAD, ahead, behind
+import numpy as np
+
+from tetsimplify.kernels.corners import DEAD, ahead, face_of, vertex_ahead, vertex_behind
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
@@ -22,6 +24,9 @@ from tetsimplify.kernels.state import (
     STAR_U,
     STAR_V,
 )
+
+
+GONE = np.uint32(2**32 + DEAD)  # the same, unsigned
 
 
 @part
@@ -41,8 +46,8 @@ def gather_stars(surface, scratch, corner):
     corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
     star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
     doomed = scratch.lists[DOOMED]
-    v = corner_vertex[corner]
-    u = corner_vertex[ahead(corner)]
+    v = np.uint32(corner_vertex[corner])
+    u = np.uint32(corner_vertex[ahead(corner)])
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
 
@@ -50,17 +55,17 @@ def gather_stars(surface, scratch, corner):
     n_doomed = 0
     c = corner
     while True:
-        n = corner_vertex[ahead(c)]
-        p = corner_vertex[behind(c)]
-        if n != DEAD:
+        n = np.uint32(vertex_ahead(corner_vertex, c))
+        p = np.uint32(vertex_behind(corner_vertex, c))
+        if n != GONE:
             mark[n] = stamp
             mark[p] = stamp
             is_doomed = (n == u) | (p == u)
-            doomed[n_doomed] = c // 3
+            doomed[n_doomed] = face_of(c)
             n_doomed += is_doomed
             star_v[n_v] = c
             n_v += 1 - is_doomed
-        c = next_corner[c]
+        c = next_corner[np.uint32(c)]
         if c == corner:
             break
 
@@ -69,9 +74,9 @@ def gather_stars(surface, scratch, corner):
     start = ahead(corner)
     c = start
     while True:
-        n = corner_vertex[ahead(c)]
-        p = corner_vertex[behind(c)]
-        if n != DEAD:
+        n = np.uint32(vertex_ahead(corner_vertex, c))
+        p = np.uint32(vertex_behind(corner_vertex, c))
+        if n != GONE:
             is_common = mark[n] == stamp
             mark[n] -= is_common
             n_common += is_common
@@ -80,7 +85,7 @@ def gather_stars(surface, scratch, corner):
             n_common += is_common
             star_u[n_u] = c
             n_u += (n != v) & (p != v)
-        c = next_corner[c]
+        c = next_corner[np.uint32(c)]
         if c == start:
             break
     return n_v, n_u, n_doomed, n_common
