@@ -110,4 +110,5 @@ N_VERTICES, N_FACES = 12, 13  # numbers of inner vertices and faces of each lens
 STATUS = 14  # of each lens
 VOTES, LENGTHS_A, LENGTHS_B = 15, 16, 17  # of the common neighbours, see outer.py
 DEFERRED = 18  # faces with a blocked edge, put off to the end of the sweep
-N_LISTS = 19
+WAITING = 19  # faces that a sweep has to look at
+N_LISTS = 20

@@ -37,6 +37,7 @@ from tetsimplify.kernels.state import (
     STAMP,
     STAMP_LIMIT,
     TOO_DEAR,
+    WAITING,
 )
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces is the last of its block
@@ -110,11 +111,17 @@ def sweep(surface, quadrics, watch, scratch, rules, listed, blocks, n_sweeps, co
 @inlined
 def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, colour, retry):
     """Sweep once over the faces listed from `first` to `last`."""
-    n_contracted = 0
-    for i in range(first, last):
+    waiting, n_waiting = scratch.lists[WAITING], 0
+    for i in range(first, last):  # without branches, which nobody could predict
         f = listed[i]
         state = surface.face_state[f]
-        if state == SETTLED or state == colour or (state == BLOCKED and not retry):
+        waiting[n_waiting] = f
+        n_waiting += (state != SETTLED) & (state != colour) & ((state != BLOCKED) | retry)
+    n_contracted = 0
+    for i in range(n_waiting):
+        f = waiting[i]
+        state = surface.face_state[f]
+        if state == SETTLED or state == colour:
             continue
         costs = edge_costs(surface.vertices, surface.corner_vertex, f)
         order = cheapest_first(costs)
@@ -193,10 +200,17 @@ def _sweep_block_ranked(
     surface, quadrics, watch, scratch, rules, cost, listed, first, last, colour, is_last
 ):
     """Sweep once over the faces listed; in the last sweep put off what is nested."""
-    n_contracted = 0
     max_cost = scratch.point[MAX_COST]
-    for i in range(first, last):
+    waiting, n_waiting = scratch.lists[WAITING], 0
+    for i in range(first, last):  # without branches, which nobody could predict
         f = listed[i]
+        state = surface.face_state[f]
+        is_cheap = min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) < max_cost
+        waiting[n_waiting] = f
+        n_waiting += (state != SETTLED) & ((state != RANKED) | is_cheap)
+    n_contracted = 0
+    for i in range(n_waiting):
+        f = waiting[i]
         state = surface.face_state[f]
         if state != RANKED:
             if state == SETTLED or _is_touched(state, colour):
