@@ -31,16 +31,18 @@ def edge_costs(vertices, corner_vertex, face):
 
 
 @part
-def cheapest_first(costs):
-    """The three edges in the order of their costs."""
+def cheapest(costs):
+    """The least of the costs of three edges, and which one it is."""
     x, y, z = costs
-    if x <= y:
-        if y <= z:
-            return 0, 1, 2
-        return (0, 2, 1) if x <= z else (2, 0, 1)
-    if x <= z:
-        return 1, 0, 2
-    return (1, 2, 0) if y <= z else (2, 1, 0)
+    least = min(min(x, y), z)
+    return least, 0 if x == least else 1 if y == least else 2
+
+
+@part
+def without(costs, k):
+    """Costs of three edges of which the k-th one is out of the question."""
+    x, y, z = costs
+    return np.inf if k == 0 else x, np.inf if k == 1 else y, np.inf if k == 2 else z
 
 
 @part

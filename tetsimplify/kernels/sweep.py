@@ -10,7 +10,7 @@ import numpy as np
 
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import cheapest_first, edge_costs, rank_face
+from tetsimplify.kernels.cost import cheapest, edge_costs, rank_face, without
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
 from tetsimplify.kernels.state import (
     BLOCK,
@@ -124,27 +124,28 @@ def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, 
         if state == SETTLED or state == colour:
             continue
         costs = edge_costs(surface.vertices, surface.corner_vertex, f)
-        order = cheapest_first(costs)
-        if costs[order[0]] >= rules.max_length2:
+        least, k = cheapest(costs)
+        if least >= rules.max_length2:
             surface.face_state[f] = SETTLED
             continue
         surface.face_state[f] = BLOCKED
         _renew_stamps(scratch)
         is_nested = False
         is_outside = False
-        for k in order:
-            if costs[k] >= rules.max_length2:
-                break
-            if state == BLOCKED and surface.verdict[3 * f + k] == OBSTRUCTED:
-                continue  # for as long as its ends stay what they are
-            outcome = contract_simple(surface, quadrics, watch, scratch, rules, 3 * f + k, colour)
-            if outcome == CONTRACTIBLE:
-                n_contracted += 1
-                is_nested = is_outside = False
-                break
-            surface.verdict[3 * f + k] = outcome
-            is_nested |= outcome == NESTED
-            is_outside |= outcome == OUTSIDE
+        while least < rules.max_length2:
+            corner = 3 * f + k
+            if state != BLOCKED or surface.verdict[corner] != OBSTRUCTED:
+                outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
+                if outcome == CONTRACTIBLE:
+                    n_contracted += 1
+                    is_nested = is_outside = False
+                    break
+                surface.verdict[corner] = outcome
+                is_nested |= outcome == NESTED
+                is_outside |= outcome == OUTSIDE
+            # else it stays so for as long as its ends stay what they are
+            costs = without(costs, k)
+            least, k = cheapest(costs)
         if is_outside:
             surface.face_state[f] = colour  # as if touched: other blocks will look at it
         elif is_nested:
@@ -216,16 +217,16 @@ def _sweep_block_ranked(
             if state == SETTLED or _is_touched(state, colour):
                 continue
             rank_face(surface, quadrics, rules, cost, f)
-        if min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) >= max_cost:
+        costs = cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]
+        least, k = cheapest(costs)
+        if least >= max_cost:
             continue
         if scratch.tally[N_SPARE] < 2:
             break
         _renew_stamps(scratch)
         is_nested = False
-        for k in cheapest_first((cost[3 * f], cost[3 * f + 1], cost[3 * f + 2])):
+        while least < max_cost:
             corner = 3 * f + k
-            if cost[corner] >= max_cost:
-                break
             outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
@@ -233,6 +234,8 @@ def _sweep_block_ranked(
                 break
             _put_off(surface, scratch, rules, cost, corner, outcome)
             is_nested |= outcome == NESTED
+            costs = without(costs, k)
+            least, k = cheapest(costs)
         if is_nested and is_last:
             _defer(scratch, f)
     return n_contracted
@@ -297,22 +300,22 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, whole, colour
                 np.float64(cost[3 * f + 2]),
             )
             limit = scratch.point[MAX_COST]
-        for k in cheapest_first(costs):
+        least, k = cheapest(costs)
+        while least < limit:
             corner = 3 * f + k
-            if costs[k] >= limit:
-                break
-            if surface.verdict[corner] != wanted:
-                continue
-            _renew_stamps(scratch)
-            outcome = contract_nested(
-                surface, quadrics, watch, scratch, rules, outer, corner, colour, commit
-            )
-            if commit and outcome == CONTRACTIBLE:
-                n_contracted += 1
-                break
-            if commit or outcome == OBSTRUCTED:
-                surface.verdict[corner] = outcome
-            if cost is not None and commit:
-                _put_off(surface, scratch, rules, cost, corner, outcome)
+            if surface.verdict[corner] == wanted:
+                _renew_stamps(scratch)
+                outcome = contract_nested(
+                    surface, quadrics, watch, scratch, rules, outer, corner, colour, commit
+                )
+                if commit and outcome == CONTRACTIBLE:
+                    n_contracted += 1
+                    break
+                if commit or outcome == OBSTRUCTED:
+                    surface.verdict[corner] = outcome
+                if cost is not None and commit:
+                    _put_off(surface, scratch, rules, cost, corner, outcome)
+            costs = without(costs, k)
+            least, k = cheapest(costs)
     scratch.tally[N_DEFERRED] = 0
     return n_contracted
