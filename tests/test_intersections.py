@@ -30,7 +30,7 @@ from tetsimplify.kernels.state import (
     NESTED,
     OBSTRUCTED,
     SETTLED,
-    STAR_V,
+    STAR,
 )
 from tetsimplify.kernels.sweep import unblock
 from tetsimplify.kernels.watch import follow, star_crosses
@@ -407,7 +407,7 @@ def contract(watch, surface, scratch, rules, corner):
     scratch.lists[DEFERRED, 0] = face
     scratch.tally[N_DEFERRED] = 1
     unblock(surface, None, None, scratch, rules, None, None, WHOLE, SETTLED, True)
-    star = scratch.lists[STAR_V]
+    star = scratch.lists[STAR]
     n = 1
     corner = surface.next_corner[star[0]]
     while corner != star[0]:

@@ -40,8 +40,7 @@ from tetsimplify.kernels.state import (
     SETTLED,
     STALE_EVEN,
     STALE_ODD,
-    STAR_U,
-    STAR_V,
+    STAR,
     TOO_DEAR,
     VIOLATE,
 )
@@ -81,7 +80,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
         surface.loop_size[loop] -= 1
     _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
     if watch is not None:
-        follow(watch, surface, scratch.lists[STAR_V], n_v + n_u)
+        follow(watch, surface, scratch.lists[STAR], n_v + n_u)
     scratch.tally[N_SIMPLE] += 1
     return CONTRACTIBLE
 
@@ -118,7 +117,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
         vertex = scratch.nodes[FOLLOWER, vertex]
     _merge(surface, quadrics, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
     if watch is not None:
-        follow(watch, surface, scratch.lists[STAR_V], lens.n_v + lens.n_u)
+        follow(watch, surface, scratch.lists[STAR], lens.n_v + lens.n_u)
     if scratch.tally[N_LENSES] > 1:
         scratch.tally[N_NESTED] += 1
         scratch.tally[N_LENS_VERTICES] += lens.n_removed
@@ -180,12 +179,9 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
     surface.locked[v] |= surface.locked[u]
     surface.loop[v] = max(surface.loop[v], surface.loop[u])
 
-    star = lists[STAR_V]
-    for i in range(n_u):
-        c = lists[STAR_U, i]
-        corner_vertex[c] = v
-        star[n_v + i] = c
-    n = n_v + n_u
+    star, n = lists[STAR], n_v + n_u
+    for i in range(n_v, n):
+        corner_vertex[star[i]] = v
     for i in range(n):
         surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
         surface.face_state[face_of(star[i])] = _touched(surface.face_state, star[i], colour)

@@ -11,7 +11,7 @@ from tetsimplify.kernels.state import (
     FOLDOVER,
     NORMAL_DEVIATION,
     SHAPE,
-    STAR_V,
+    STAR,
 )
 
 NO_GUARD = -2.0  # a cosine that every pair of normals exceeds
@@ -25,11 +25,13 @@ NEEDLE = 0.1
 
 
 @part
-def turns_over(vertices, corner_vertex, star, n, v, point, cos_foldover):
-    """Whether a face of `star` turns too far when its vertex v moves to `point`."""
+def turns_over(vertices, corner_vertex, star, n_v, n_u, v, u, point, cos_foldover):
+    """Whether a face of `star` turns too far when its vertex v or u moves to `point`."""
     px, py, pz = point[0], point[1], point[2]
-    ox, oy, oz = vertices[v, 0] - px, vertices[v, 1] - py, vertices[v, 2] - pz
-    for i in range(n):
+    vx, vy, vz = vertices[v, 0] - px, vertices[v, 1] - py, vertices[v, 2] - pz
+    ux, uy, uz = vertices[u, 0] - px, vertices[u, 1] - py, vertices[u, 2] - pz
+    for i in range(n_v + n_u):
+        ox, oy, oz = (vx, vy, vz) if i < n_v else (ux, uy, uz)
         a = np.uint32(vertex_ahead(corner_vertex, star[i]))
         b = np.uint32(vertex_behind(corner_vertex, star[i]))
         ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
@@ -75,43 +77,43 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
     foldover = rules.cos_foldover * abs(rules.cos_foldover)
     deviation = rules.cos_deviation * abs(rules.cos_deviation)
     worst_old = worst_new = 1.0  # squares of the shapes
-    for side in range(2):
-        w, n = (v, n_v) if side == 0 else (u, n_u)
-        star = scratch.lists[STAR_V + side]
-        ox, oy, oz = vertices[w, 0] - px, vertices[w, 1] - py, vertices[w, 2] - pz
-        for i in range(n):
-            a = np.uint32(vertex_ahead(corner_vertex, star[i]))
-            b = np.uint32(vertex_behind(corner_vertex, star[i]))
-            ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
-            bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
-            new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            new2 = new_x * new_x + new_y * new_y + new_z * new_z
-            across2 = (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2
-            new_sum = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz + across2
-            ax, ay, az = ax - ox, ay - oy, az - oz
-            bx, by, bz = bx - ox, by - oy, bz - oz
-            old_x, old_y, old_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            old2 = old_x * old_x + old_y * old_y + old_z * old_z
-            old_sum = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz + across2
+    vx, vy, vz = vertices[v, 0] - px, vertices[v, 1] - py, vertices[v, 2] - pz
+    ux, uy, uz = vertices[u, 0] - px, vertices[u, 1] - py, vertices[u, 2] - pz
+    star = scratch.lists[STAR]
+    for i in range(n_v + n_u):
+        ox, oy, oz = (vx, vy, vz) if i < n_v else (ux, uy, uz)
+        a = np.uint32(vertex_ahead(corner_vertex, star[i]))
+        b = np.uint32(vertex_behind(corner_vertex, star[i]))
+        ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
+        bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
+        new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        new2 = new_x * new_x + new_y * new_y + new_z * new_z
+        across2 = (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2
+        new_sum = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz + across2
+        ax, ay, az = ax - ox, ay - oy, az - oz
+        bx, by, bz = bx - ox, by - oy, bz - oz
+        old_x, old_y, old_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        old2 = old_x * old_x + old_y * old_y + old_z * old_z
+        old_sum = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz + across2
 
-            dot = old_x * new_x + old_y * new_y + old_z * new_z
-            if dot * abs(dot) <= foldover * old2 * new2 and rules.cos_foldover > NO_GUARD:
-                if old2 > FLAT * FLAT * old_sum * old_sum:
-                    return FOLDOVER
-            if rules.cos_deviation > NO_GUARD:
-                rx = sum_x + quadrics[a, NORMAL] + quadrics[b, NORMAL]
-                ry = sum_y + quadrics[a, NORMAL + 1] + quadrics[b, NORMAL + 1]
-                rz = sum_z + quadrics[a, NORMAL + 2] + quadrics[b, NORMAL + 2]
-                r2 = rx * rx + ry * ry + rz * rz
-                cancelled = UNDECIDED * (sum_area + quadrics[a, AREA] + quadrics[b, AREA])
-                dot = rx * new_x + ry * new_y + rz * new_z
-                if dot * abs(dot) < deviation * r2 * new2 and r2 > cancelled * cancelled:
-                    return NORMAL_DEVIATION
-            # the shape of a triangle is 4 sqrt(3) area / (sum of the squares of its edges)
-            if 12.0 * new2 < worst_new * new_sum * new_sum:
-                worst_new = 12.0 * new2 / (new_sum * new_sum)
-            if 12.0 * old2 < worst_old * old_sum * old_sum:
-                worst_old = 12.0 * old2 / (old_sum * old_sum)
+        dot = old_x * new_x + old_y * new_y + old_z * new_z
+        if dot * abs(dot) <= foldover * old2 * new2 and rules.cos_foldover > NO_GUARD:
+            if old2 > FLAT * FLAT * old_sum * old_sum:
+                return FOLDOVER
+        if rules.cos_deviation > NO_GUARD:
+            rx = sum_x + quadrics[a, NORMAL] + quadrics[b, NORMAL]
+            ry = sum_y + quadrics[a, NORMAL + 1] + quadrics[b, NORMAL + 1]
+            rz = sum_z + quadrics[a, NORMAL + 2] + quadrics[b, NORMAL + 2]
+            r2 = rx * rx + ry * ry + rz * rz
+            cancelled = UNDECIDED * (sum_area + quadrics[a, AREA] + quadrics[b, AREA])
+            dot = rx * new_x + ry * new_y + rz * new_z
+            if dot * abs(dot) < deviation * r2 * new2 and r2 > cancelled * cancelled:
+                return NORMAL_DEVIATION
+        # the shape of a triangle is 4 sqrt(3) area / (sum of the squares of its edges)
+        if 12.0 * new2 < worst_new * new_sum * new_sum:
+            worst_new = 12.0 * new2 / (new_sum * new_sum)
+        if 12.0 * old2 < worst_old * old_sum * old_sum:
+            worst_old = 12.0 * old2 / (old_sum * old_sum)
 
     point[FACTOR] = 1.0
     allowed = min(worst_old, rules.shape * rules.shape)

@@ -56,8 +56,7 @@ from tetsimplify.kernels.state import (
     REMOVAL_LIMIT,
     SLOT,
     STAMP,
-    STAR_U,
-    STAR_V,
+    STAR,
     STATUS,
     VOTES,
 )
@@ -71,8 +70,8 @@ class Choice(NamedTuple):
     """Which lens stays, by what then survives and goes."""
 
     outcome: int  # CONTRACTIBLE, or the reason why no lens can be kept
-    n_v: int  # surviving corners in STAR_V
-    n_u: int  # surviving corners in STAR_U
+    n_v: int  # surviving corners in STAR
+    n_u: int  # the same of u, which follow
     n_doomed: int  # removed faces in DOOMED
     n_removed: int  # vertices that vanish with the removed lenses
     first_removed: int  # the first of them, which are linked by FOLLOWER
@@ -124,7 +123,7 @@ def _common_neighbours(surface, scratch, corner):
     lists, slot = scratch.lists, scratch.nodes[SLOT]
     link_v, link_u = lists[LINK_V], lists[LINK_U]
     v, u = corner_vertex[corner], corner_vertex[ahead(corner)]
-    spare = lists[STAR_V]  # free until survivors are listed
+    spare = lists[STAR]  # free until survivors are listed
     cone_v = loop.size + loop[v] if loop[v] >= 0 else -1
     cone_u = loop.size + loop[u] if loop[u] >= 0 else -1
     n_v = ordered_link(
@@ -287,7 +286,7 @@ def _arc_length(surface, scratch, corner, lens):
         surface.next_corner,
         begin,
         surface.corner_vertex[end],
-        scratch.lists[STAR_V],
+        scratch.lists[STAR],
         scratch.nodes[SLOT],
     )
 
@@ -415,8 +414,8 @@ def _remove_others(surface, scratch, corner, kept, loop_size):
     corner_vertex, next_corner = surface.corner_vertex, surface.next_corner
     lists, nodes, face_mark = scratch.lists, scratch.nodes, scratch.face_mark
     doomed, n_lenses = lists[DOOMED], scratch.tally[N_LENSES]
-    n_v = _copy_fan(lists[FAN_V], lists[CUT_V, kept], lists[CUT_V, kept + 1], lists[STAR_V])
-    n_u = _copy_fan(lists[FAN_U], lists[CUT_U, kept + 1], lists[CUT_U, kept], lists[STAR_U])
+    n_v = _copy_fan(lists[FAN_V], lists[CUT_V, kept], lists[CUT_V, kept + 1], lists[STAR], 0)
+    n_u = _copy_fan(lists[FAN_U], lists[CUT_U, kept + 1], lists[CUT_U, kept], lists[STAR], n_v)
 
     # faces that go are marked with their lens, those of the edge with one lens more
     first = scratch.tally[LENS_STAMP]
@@ -454,12 +453,12 @@ def _remove_others(surface, scratch, corner, kept, loop_size):
 
 
 @cold_part
-def _copy_fan(fan, begin, end, star):
+def _copy_fan(fan, begin, end, star, first):
     """Copy the real corners of a sector; return their number."""
     n = 0
     for i in range(begin, end):
         if fan[i] >= 0:
-            star[n] = fan[i]
+            star[first + n] = fan[i]
             n += 1
     return n
 

@@ -21,8 +21,7 @@ from tetsimplify.kernels.state import (
     NESTED,
     OBSTRUCTED,
     STAMP,
-    STAR_U,
-    STAR_V,
+    STAR,
 )
 
 
@@ -33,8 +32,8 @@ GONE = np.uint32(2**32 + DEAD)  # the same, unsigned
 def gather_stars(surface, scratch, corner):
     """Collect the stars of the ends v, u of the edge that begins at `corner`.
 
-    The corners that survive a simple contraction go to `star_v` and `star_u`, the faces that
-    it removes to `doomed`.
+    The corners that survive a simple contraction go to STAR, those of v first, the faces that it
+    removes to DOOMED.
 
     Returns
     -------
@@ -44,8 +43,7 @@ def gather_stars(surface, scratch, corner):
         Number of real common neighbours of v and u.
     """
     corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
-    star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
-    doomed = scratch.lists[DOOMED]
+    star, doomed = scratch.lists[STAR], scratch.lists[DOOMED]
     v = np.uint32(corner_vertex[corner])
     u = np.uint32(corner_vertex[ahead(corner)])
     stamp = scratch.tally[STAMP] + 2
@@ -63,7 +61,7 @@ def gather_stars(surface, scratch, corner):
             is_doomed = (n == u) | (p == u)
             doomed[n_doomed] = face_of(c)
             n_doomed += is_doomed
-            star_v[n_v] = c
+            star[n_v] = c
             n_v += 1 - is_doomed
         c = next_corner[np.uint32(c)]
         if c == corner:
@@ -83,7 +81,7 @@ def gather_stars(surface, scratch, corner):
             is_common = mark[p] == stamp
             mark[p] -= is_common
             n_common += is_common
-            star_u[n_u] = c
+            star[n_v + n_u] = c
             n_u += (n != v) & (p != v)
         c = next_corner[np.uint32(c)]
         if c == start:

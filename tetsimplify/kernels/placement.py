@@ -8,7 +8,7 @@ is left in `scratch.point`.
 from tetsimplify.kernels.guards import NO_GUARD, harm, turns_over
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.quadrics import MAX_REACH, optimum, sum_at, value
-from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE, STAR_U, STAR_V
+from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE, STAR
 
 FREE = -1.0  # no end of the edge has to stay
 
@@ -38,8 +38,7 @@ def _first_place(surface, scratch, rules, v, u, n_v, n_u):
     """The first of the places of the rules that folds nothing over."""
     fixed = fixed_place(surface, v, u)
     vertices, corner_vertex, point = surface.vertices, surface.corner_vertex, scratch.point
-    star_v, star_u = scratch.lists[STAR_V], scratch.lists[STAR_U]
-    cos = rules.cos_foldover
+    star, cos = scratch.lists[STAR], rules.cos_foldover
     for place in rules.places:
         t = place if fixed == FREE else fixed
         point[PLACE] = t
@@ -48,9 +47,8 @@ def _first_place(surface, scratch, rules, v, u, n_v, n_u):
             point[axis] = a if t == 0.0 else b if t == 1.0 else a + t * (b - a)
         if cos <= NO_GUARD:
             return CONTRACTIBLE
-        if not turns_over(vertices, corner_vertex, star_v, n_v, v, point, cos):
-            if not turns_over(vertices, corner_vertex, star_u, n_u, u, point, cos):
-                return CONTRACTIBLE
+        if not turns_over(vertices, corner_vertex, star, n_v, n_u, v, u, point, cos):
+            return CONTRACTIBLE
         if fixed != FREE:
             break
     return FOLDOVER

@@ -100,7 +100,7 @@ FOLLOWER = 1  # next vertex in a linked list
 ENTRY = 2  # a corner of the vertex
 
 # Rows of `Scratch.lists`.
-STAR_V, STAR_U = 0, 1  # corners of the two ends that survive the contraction
+STAR = 0  # corners of the two ends that survive the contraction, first those of v
 DOOMED = 2  # faces that the contraction removes
 LINK_V, LINK_U = 3, 4  # links of the two ends in order
 FAN_V, FAN_U = 5, 6  # corners of the two ends in order

@@ -22,7 +22,7 @@ from tetsimplify.kernels.corners import DEAD, ahead, behind
 from tetsimplify.kernels.crossing import faces_cross, turn
 from tetsimplify.kernels.intersections import BLOCK, bound
 from tetsimplify.kernels.jit import cold_part, inlined, part
-from tetsimplify.kernels.state import DOOMED, STAMP, STAR_U, STAR_V
+from tetsimplify.kernels.state import DOOMED, STAMP, STAR
 
 
 class Move(NamedTuple):
@@ -31,7 +31,7 @@ class Move(NamedTuple):
     v: int
     u: int
     old: tuple  # place of v before
-    n: int  # corners of the star, in STAR_V
+    n: int  # corners of the star, in STAR
     first: int  # of these, which have another shape than before
     last: int
     n_doomed: int  # faces that go, in DOOMED
@@ -50,14 +50,12 @@ def star_crosses(watch, surface, scratch, v, u, n_v, n_u, n_doomed):
     surface : Surface
         A manifold. The place of v is changed meanwhile.
     scratch : Scratch
-        The corners that survive are in STAR_V and STAR_U, the faces that go in DOOMED, the place
+        The corners that survive are in STAR, the faces that go in DOOMED, the place
         of the new vertex in `point`.
     n_v, n_u, n_doomed : int
         How many there are of each.
     """
-    vertices, star = surface.vertices, scratch.lists[STAR_V]
-    for i in range(n_u):
-        star[n_v + i] = scratch.lists[STAR_U, i]
+    vertices, star = surface.vertices, scratch.lists[STAR]
     n = n_v + n_u
     old = vertices[v, 0], vertices[v, 1], vertices[v, 2]
     new = scratch.point[0], scratch.point[1], scratch.point[2]
@@ -106,7 +104,7 @@ def _best_view(surface, star, v, n):
 @inlined
 def _mark_spread(surface, scratch, move):
     """Mark the vertices of the star around which the faces will lie side by side."""
-    corner_vertex, star, mark = surface.corner_vertex, scratch.lists[STAR_V], scratch.mark
+    corner_vertex, star, mark = surface.corner_vertex, scratch.lists[STAR], scratch.mark
     stamp = scratch.tally[STAMP] + 2  # stamp - 1: the faces do not
     scratch.tally[STAMP] = stamp
     n_rounds = 0
@@ -160,7 +158,7 @@ def _rounds(vertices, w, a, b, axis, way):
 @inlined
 def _crosses_itself(surface, scratch, move):
     """Whether two faces of the star cross and did not before."""
-    corner_vertex, star = surface.corner_vertex, scratch.lists[STAR_V]
+    corner_vertex, star = surface.corner_vertex, scratch.lists[STAR]
     if scratch.mark[move.v] == scratch.tally[STAMP]:
         return False
     for i in range(1, move.n):
@@ -179,7 +177,7 @@ def _crosses_itself(surface, scratch, move):
 @inlined
 def _crosses_others(watch, surface, scratch, move):
     """Whether a face of the star crosses one that is not of it, and did not before."""
-    vertices, corner_vertex, star = surface.vertices, surface.corner_vertex, scratch.lists[STAR_V]
+    vertices, corner_vertex, star = surface.vertices, surface.corner_vertex, scratch.lists[STAR]
     mark, spread = scratch.mark, scratch.tally[STAMP]
     turns = mark[move.v] == spread  # and so all faces of the star do, the same way
     n_others = _find_others(watch, surface, star, move)
