@@ -159,7 +159,7 @@ def threads_for_all(monkeypatch):
 
 def as_bytes(examined):
     """All that is found, to the last bit."""
-    report, loop, next_corner = examined
+    report, loop, next_corner, _ = examined
     fields = {
         name: value.tobytes() if isinstance(value, np.ndarray) else value
         for name, value in dataclasses.asdict(report).items()

@@ -110,13 +110,15 @@ class Engine:
         self._crew = Crew(threads)
         self.n_threads = self._crew.n_threads
         self._arranged, self._cells = _arrange(mesh, options, self._crew)
-        self._surface, self.topology_before = start_surface(
+        self._surface, self.topology_before, first_corner = start_surface(
             *(mesh, self._arranged, options, locked, self.n_threads)
         )
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics = start_quadrics(self._surface, options, arranged_bound)
+            self._quadrics = start_quadrics(
+                self._surface, first_corner, options, arranged_bound, self._crew
+            )
         self._cost = None if options.has_one_threshold else np.full(3 * m, np.inf, np.float32)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
+from tetsimplify.crew import Crew
 from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
 from tetsimplify.mesh import Mesh
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 CACHE_LINE = 64  # bytes
+SAMPLE = 2**12  # faces whose areas tell the unit of the weights
+AT_ONCE = 2**16  # vertices in a task for a thread
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
 
 
@@ -30,8 +33,8 @@ def start_surface(
     options: Options,
     locked: NDArray[np.bool_],
     threads: int | None = None,
-) -> tuple[Surface, TopologyReport]:
-    """The corner table of a mesh, and its topology.
+) -> tuple[Surface, TopologyReport, NDArray[np.int32]]:
+    """The corner table of a mesh, its topology, and a corner of each vertex.
 
     Parameters
     ----------
@@ -52,7 +55,7 @@ def start_surface(
     mesh = arranged.mesh
     n, m = len(mesh.vertices), len(mesh.faces)
     corner_vertex = mesh.faces.reshape(-1)
-    report, loop, next_corner = examine(corner_vertex, n, threads=threads)
+    report, loop, next_corner, first_corner = examine(corner_vertex, n, threads=threads)
     if not report.is_manifold:
         defects = topology(*given).defects()  # which are told in the order given
         raise MeshError(
@@ -78,7 +81,7 @@ def start_surface(
         merges=np.empty((n, 2)),
     )
     kernels.loops.count_loop_edges(surface.loop, surface.merged_into, surface.loop_size)
-    return surface, report
+    return surface, report, first_corner
 
 
 def _held_boundary(
@@ -103,33 +106,56 @@ def _held_boundary(
 
 
 def start_quadrics(
-    surface: Surface, options: Options, bound: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
+    surface: Surface,
+    first_corner: NDArray[np.int32],
+    options: Options,
+    bound: NDArray[np.float64] | None,
+    crew: Crew,
+) -> NDArray[np.float32]:
     """The quadrics of all faces, and of boundary and feature edges; see kernels/quadrics.py.
 
     Parameters
     ----------
     surface : Surface
+    first_corner : ndarray, shape (n,), int32
+        A corner of each vertex, -1 where it has none.
     options : Options
     bound : ndarray, shape (n,), float64, optional
         Largest quadric error that each vertex may come to, instead of that of the options. None is
         small enough for a negative one.
+    crew : Crew
     """
     n = len(surface.vertices)
     limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
     quadrics = _aligned_rows(n, kernels.quadrics.WIDTH)
     quadrics[:, kernels.quadrics.MAX_ERROR2] = limit if bound is None else bound
     quadrics[:, kernels.quadrics.MAX_ERROR2] *= np.abs(quadrics[:, kernels.quadrics.MAX_ERROR2])
-    kernels.quadrics.add_faces(surface.vertices, surface.corner_vertex, quadrics)
+    unit = _weight_unit(surface)
+
+    def sum_faces(part: slice) -> None:
+        kernels.quadrics.sum_faces(
+            *(surface.vertices, surface.corner_vertex, surface.next_corner, first_corner),
+            *(unit, part.start, part.stop, quadrics),
+        )
+
+    crew.share(sum_faces, n, AT_ONCE)
     sharp = -1.0
     if options.feature_angle is not None:
         sharp = math.cos(math.radians(options.feature_angle))
     if sharp > -1.0 or surface.loop_size.any():
-        kernels.quadrics.add_creases(surface, quadrics, BOUNDARY_WEIGHT, FEATURE_WEIGHT, sharp)
+        weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
+        kernels.quadrics.add_creases(surface, quadrics, *weights, sharp)
     return quadrics
 
 
-def _aligned_rows(n: int, width: int) -> NDArray[np.float64]:
+def _weight_unit(surface: Surface) -> float:
+    """About the mean area of a face. A power of two: so a mesh twice as large gives the same."""
+    step = max(1, len(surface.face_state) // SAMPLE)
+    area = kernels.quadrics.mean_area(surface.vertices, surface.corner_vertex, step)
+    return float(2.0 ** round(math.log2(area))) if 0.0 < area < math.inf else 1.0
+
+
+def _aligned_rows(n: int, width: int) -> NDArray[np.float32]:
     """Zeros, with every row in as few lines of a cache as can be."""
     line = CACHE_LINE // 4
     memory = np.zeros(n * width + line, np.float32)

@@ -152,6 +152,8 @@ class Examined(NamedTuple):
     """Shape (n,): the number of the boundary loop of each vertex, -1 inside."""
     next_corner: Indices
     """Shape (3 m,): the corner table, as of `kernels.corners.link_corners`."""
+    first_corner: Indices
+    """Shape (n,): a corner of each vertex, -1 where it has none."""
 
 
 def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = None) -> Examined:
@@ -204,7 +206,7 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
             irregular = rest[:n_irregular]
             defects = kernels.defects.inspect(corner_vertex, found, irregular, longest)
     report = _report(corner_vertex, found, defects, n_edges, n_boundary, n_degenerate)
-    return Examined(report, found.loop, found.next_corner)
+    return Examined(report, found.loop, found.next_corner, found.first_corner)
 
 
 def _report(

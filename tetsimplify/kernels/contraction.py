@@ -69,7 +69,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
         return ENOUGH
     placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
     if placed == CONTRACTIBLE and quadrics is not None:
-        placed = _judge(quadrics, scratch, rules, v, u)
+        placed = _judge(surface, quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and watch is not None:
         if star_crosses(watch, surface, scratch, v, u, n_v, n_u, n_doomed):
             placed = INTERSECTION
@@ -103,7 +103,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
         placed = ENOUGH
     if placed == CONTRACTIBLE and quadrics is not None:
         _add_removed(surface, quadrics, scratch, lens.first_removed)
-        placed = _judge(quadrics, scratch, rules, v, u)
+        placed = _judge(surface, quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and watch is not None:
         if star_crosses(watch, surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed):
             placed = INTERSECTION
@@ -128,12 +128,12 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
 
 
 @part
-def _judge(quadrics, scratch, rules, v, u):
+def _judge(surface, quadrics, scratch, rules, v, u):
     """Whether the place found, which need not be the best one, is within the bounds."""
     error, terms = scratch.point[ERROR], quadrics
     if error > (weight(terms, v) + weight(terms, u)) * error_bound(quadrics, v, u):
         return ERROR_BOUND
-    scratch.point[COST] = increase(terms, v, u, error) * scratch.point[FACTOR]
+    scratch.point[COST] = increase(terms, surface.vertices, v, u, error) * scratch.point[FACTOR]
     is_dear = scratch.point[COST] > scratch.point[MAX_PRICE] and not rules.by_length
     return TOO_DEAR if is_dear else CONTRACTIBLE
 

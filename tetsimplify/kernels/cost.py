@@ -66,7 +66,7 @@ def _ranked_cost(surface, quadrics, rules, a, b):
     error = least_error(sum_at(terms, vertices, a, b), x, y, z, fixed, rules)[4]
     if error > (weight(terms, a) + weight(terms, b)) * error_bound(quadrics, a, b):
         return np.inf, ERROR_BOUND
-    return length2 if rules.by_length else increase(terms, a, b, error), CONTRACTIBLE
+    return length2 if rules.by_length else increase(terms, vertices, a, b, error), CONTRACTIBLE
 
 
 @part

@@ -5,20 +5,23 @@ place y, relative to the vertex itself, it is
 
     Q(y) = y' A y + 2 b' y + c,     A = sum of w n n'
 
-with the normal n and the weight w, the area, of each plane. Relative to the vertex: so a
-mesh far from the origin loses nothing, a quadric that is new has b = 0 and c = 0, and on a plane Q
-stays zero to the last bits. The trace of A is the sum of the areas, so Q / trace(A) is a mean
+with the normal n and the weight w of each plane: its area, in units of about the mean area of the
+faces given, so that single precision is enough for meshes of any size. Relative to the vertex: so a
+mesh far from the origin loses nothing, and a quadric that is new has b = 0 and c = 0. Sums are
+computed in double precision and kept in single: distances from planes are right to 1e-4 of the
+size of what has been merged. The trace of A is the sum of the areas, so Q / trace(A) is a mean
 squared distance.
 """
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead, behind
+from tetsimplify.kernels.corners import ahead, behind, vertex_ahead, vertex_behind
+from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
 
-# Columns of the row of a vertex, which is as long as two lines of a cache: the upper half of A, b
+# Columns of the row of a vertex, which is as long as a line of a cache: the upper half of A, b
 # and c; the largest mean squared distance allowed; sums of the original normals, by area, and of
 # the areas.
 CONSTANT, MAX_ERROR2, NORMAL, AREA = 9, 10, 11, 14
@@ -30,6 +33,8 @@ WIDTH = 16
 STABILITY = 1e-3
 # So often the optimum is computed anew with the spring at the last one.
 REFINEMENTS = 4
+# What single precision leaves uncertain: so much of the weight times the squared length of the edge.
+ROUNDING = 2.0**-22
 # Farther than so many lengths of the edge from its middle no optimum is believed.
 MAX_REACH = 2.0
 
@@ -81,9 +86,11 @@ def weight(terms, v):
 
 
 @part
-def increase(terms, v, u, error):
-    """How much more the error is than those of v and u alone."""
-    return max(error - terms[v, CONSTANT] - terms[u, CONSTANT], 0.0)
+def increase(terms, vertices, v, u, error):
+    """How much more the error is than those of v and u alone; zero below what is certain."""
+    more = error - terms[v, CONSTANT] - terms[u, CONSTANT]
+    rounded = ROUNDING * (weight(terms, v) + weight(terms, u)) * squared_length(vertices, v, u)
+    return more if more > rounded else 0.0
 
 
 @part
@@ -165,27 +172,61 @@ def _area_vector(vertices, a, b, c):
 
 
 @kernel_in_place
-def add_faces(vertices, corner_vertex, terms):
-    """Add the plane of each face to the quadrics of its vertices, and its normal to theirs."""
-    for f in range(corner_vertex.size // 3):
-        a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
+def mean_area(vertices, corner_vertex, step):
+    """Mean area of every so many-th face."""
+    area, n = 0.0, 0
+    for first in range(0, corner_vertex.size, 3 * step):
+        a, b, c = corner_vertex[first], corner_vertex[first + 1], corner_vertex[first + 2]
         x, y, z = _area_vector(vertices, a, b, c)
-        area = np.sqrt(x * x + y * y + z * z)
-        scale = 1.0 / area if area > 0.0 else 0.0
-        for v in (a, b, c):
-            _add_plane(terms, v, scale, x, y, z)
-            terms[v, NORMAL] += x
-            terms[v, NORMAL + 1] += y
-            terms[v, NORMAL + 2] += z
-            terms[v, AREA] += area
+        area += np.sqrt(x * x + y * y + z * z)
+        n += 1
+    return area / max(1, n)
 
 
 @kernel_in_place
-def add_creases(surface, terms, boundary_weight, feature_weight, cos_feature):
+def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, last, terms):
+    """Sum the planes, the normals and the areas of the faces around the vertices from `first`.
+
+    Parameters
+    ----------
+    first_corner : int32 (n,)
+        A corner of each vertex, -1 where it has none.
+    unit : float
+        Of the weights: areas are counted in it.
+    first, last : int
+        Which vertices.
+    """
+    for v in range(first, last):
+        if first_corner[v] < 0:
+            continue
+        xx = xy = xz = yy = yz = zz = 0.0
+        sum_x = sum_y = sum_z = sum_area = 0.0
+        c = first_corner[v]
+        while True:
+            a, b = vertex_ahead(corner_vertex, c), vertex_behind(corner_vertex, c)
+            x, y, z = _area_vector(vertices, v, np.uint32(a), np.uint32(b))
+            area = np.sqrt(x * x + y * y + z * z)
+            scale = 1.0 / area if area > 0.0 else 0.0
+            xx, xy, xz = xx + scale * x * x, xy + scale * x * y, xz + scale * x * z
+            yy, yz, zz = yy + scale * y * y, yz + scale * y * z, zz + scale * z * z
+            sum_x, sum_y, sum_z, sum_area = sum_x + x, sum_y + y, sum_z + z, sum_area + area
+            c = next_corner[c]
+            if c == first_corner[v]:
+                break
+        terms[v, 0], terms[v, 1], terms[v, 2] = xx / unit, xy / unit, xz / unit
+        terms[v, 3], terms[v, 4], terms[v, 5] = yy / unit, yz / unit, zz / unit
+        terms[v, NORMAL], terms[v, NORMAL + 1] = sum_x / unit, sum_y / unit
+        terms[v, NORMAL + 2], terms[v, AREA] = sum_z / unit, sum_area / unit
+
+
+@kernel_in_place
+def add_creases(surface, terms, unit, boundary_weight, feature_weight, cos_feature):
     """Hold boundary and feature edges by planes through them, upright on their faces.
 
     Parameters
     ----------
+    unit : float
+        Of the weights.
     boundary_weight, feature_weight : float
         Weight of a plane, in squared lengths of the edge.
     cos_feature : float
@@ -200,7 +241,7 @@ def add_creases(surface, terms, boundary_weight, feature_weight, cos_feature):
         square = x * x + y * y + z * z
         if square == 0.0:
             continue
-        scale = boundary_weight / square
+        scale = boundary_weight / (unit * square)
         across = face_across(corner_vertex, surface.next_corner, corner)
         if across >= 0:
             first = 3 * across
@@ -210,7 +251,7 @@ def add_creases(surface, terms, boundary_weight, feature_weight, cos_feature):
             cosine = x * ox + y * oy + z * oz
             if cosine >= cos_feature * np.sqrt(square * (ox * ox + oy * oy + oz * oz)):
                 continue
-            scale = feature_weight / square
+            scale = feature_weight / (unit * square)
         ex = vertices[b, 0] - vertices[a, 0]
         ey = vertices[b, 1] - vertices[a, 1]
         ez = vertices[b, 2] - vertices[a, 2]
