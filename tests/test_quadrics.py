@@ -17,8 +17,10 @@ from test_simplify import assert_maps_fit, assert_remaining_listed, assert_same_
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
+from tetsimplify.kernels.quadrics import CONSTANT, LINEAR
 from tetsimplify.options import BLOCKED, BOUNDARIES, PLACEMENTS, Options
 from tetsimplify.schedule import next_thresholds, run
+from tetsimplify.start import new_quadrics
 
 OFF = {"foldover": None, "normal_deviation": None, "shape": None}
 MODES = [
@@ -87,7 +89,7 @@ def tube(n_around=48, n_along=24):
 def quadrics_of(vertices, faces):
     mesh = as_mesh(vertices, faces)
     n = len(mesh.vertices)
-    quadrics = np.zeros((n, kernels.quadrics.WIDTH))
+    quadrics = new_quadrics(n)
     corner_vertex = mesh.faces.reshape(-1)
     first_corner, next_corner, _ = kernels.corners.link_corners(corner_vertex, n)
     links = corner_vertex, next_corner, first_corner
@@ -100,9 +102,9 @@ def matrix(q):
     return np.array([[q[0], q[1], q[2]], [q[1], q[3], q[4]], [q[2], q[4], q[5]]])
 
 
-def error_at(terms, vertices, v, u, point):
+def error_at(quadrics, vertices, v, u, point):
     """The quadric of two vertices at a point, as the kernels accumulate it."""
-    q = kernels.quadrics.sum_at.py_func(terms, vertices, v, u)
+    q = kernels.quadrics.sum_at.py_func(quadrics, vertices, v, u)
     y = point - vertices[v]
     return float(y @ matrix(q) @ y + 2.0 * np.dot(q[6:9], y) + q[9])
 
@@ -112,12 +114,12 @@ def test_the_quadric_of_an_edge_is_the_sum_over_its_planes(offset):
     rng = np.random.default_rng(3)
     vertices, faces = meshes.icosphere(2)
     vertices = vertices + offset
-    terms = quadrics_of(vertices, faces)
+    quadrics = quadrics_of(vertices, faces)
     planes = naive_quadrics.planes_of(vertices, faces)
     for v, u in naive.all_edges(faces)[:40]:
         point = 0.5 * (vertices[v] + vertices[u]) + rng.normal(scale=0.1, size=3)
         expected = naive_quadrics.quadric_error(planes[v] + planes[u], point)
-        assert error_at(terms, vertices, v, u, point) == pytest.approx(expected, rel=1e-9)
+        assert error_at(quadrics, vertices, v, u, point) == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_optimum_is_where_the_planes_meet():
@@ -125,24 +127,25 @@ def test_the_optimum_is_where_the_planes_meet():
     for offset in (0.0, 1e6):
         corner = np.array([0.3, -0.2, 0.7])
         vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]) + offset
-        terms = np.zeros((2, kernels.quadrics.WIDTH))
+        quadrics = new_quadrics(2)
         for axis in range(3):
-            terms[0, (0, 3, 5)[axis]] += 1.0
-            terms[0, 6 + axis] -= corner[axis]
-        terms[0, 9] = corner @ corner
-        q = kernels.quadrics.sum_at.py_func(terms, vertices, 0, 1)
+            quadrics.matrix[0, (0, 3, 5)[axis]] += 1.0
+            quadrics.linear[0, LINEAR + axis] -= corner[axis]
+        quadrics.linear[0, CONSTANT] = corner @ corner
+        q = kernels.quadrics.sum_at.py_func(quadrics, vertices, 0, 1)
         found = np.array(kernels.quadrics.optimum.py_func(q, 0.5, 0.0, 0.0))
         assert np.allclose(found, corner, atol=1e-3)
 
 
 def test_the_optimum_is_the_middle_where_the_planes_do_not_decide():
     """One plane: the middle of the edge, dropped on the plane; also where nothing is known."""
-    terms = np.zeros((2, kernels.quadrics.WIDTH))
+    quadrics = new_quadrics(2)
     vertices = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 0.0]])
-    q = kernels.quadrics.sum_at.py_func(terms, vertices, 0, 1)
+    q = kernels.quadrics.sum_at.py_func(quadrics, vertices, 0, 1)
     assert kernels.quadrics.optimum.py_func(q, 1.0, 1.0, 0.0) == (1.0, 1.0, 0.0)
-    terms[0, 5], terms[0, 8], terms[0, 9] = 1.0, -0.25, 0.0625  # the plane z = 1/4
-    q = kernels.quadrics.sum_at.py_func(terms, vertices, 0, 1)
+    quadrics.matrix[0, 5] = 1.0  # the plane z = 1/4
+    quadrics.linear[0, [LINEAR + 2, CONSTANT]] = -0.25, 0.0625
+    q = kernels.quadrics.sum_at.py_func(quadrics, vertices, 0, 1)
     x, y, z = kernels.quadrics.optimum.py_func(q, 1.0, 1.0, 0.0)
     assert (x, y) == (1.0, 1.0)
     assert z == pytest.approx(0.25, rel=1e-3)

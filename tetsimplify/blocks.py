@@ -110,9 +110,7 @@ def copy_live(
         at = begin[part.start // PART]
         for way in range(2):
             of_faces = cells.of_faces[way]
-            kernels.blocks.copy_cells(
-                corner_vertex, of_faces, part.start, part.stop, at, live[way]
-            )
+            kernels.blocks.copy_cells(corner_vertex, of_faces, part.start, part.stop, at, live[way])
 
     crew.share(copy, len(corner_vertex) // 3, PART)
     return cells._replace(of_faces=(live[0], live[1]))

@@ -229,7 +229,6 @@ class Engine:
 
     def rank(self) -> None:
         """Bring the costs of the edges up to date."""
-
         bundles = self._surface, self._quadrics, self.rules, self._cost
 
         def task(part: slice) -> None:
@@ -304,7 +303,7 @@ class Engine:
         )
         if self._quadrics is None or self.rules.by_length:
             return nothing2
-        areas = self._quadrics[:, kernels.quadrics.AREA]  # every one three times
+        areas = self._quadrics.origin[:, kernels.quadrics.AREA]  # every one three times
         return nothing2 * float(areas.sum()) / (3 * max(1, self.n_faces))
 
     def sample_of_costs(self) -> NDArray[np.float32]:
@@ -455,9 +454,10 @@ class Engine:
             return np.empty(0)
         place, is_used = self._arranged.vertex_place, number >= 0
         is_left = (self._surface.merged_into == np.arange(len(number))) & is_used
-        terms = self._quadrics[place[is_left[place]]].astype(np.float64)
-        weight = terms[:, 0] + terms[:, 3] + terms[:, 5]
-        errors: NDArray[np.float64] = np.sqrt(terms[:, 9] / np.where(weight > 0.0, weight, 1.0))
+        left = place[is_left[place]]
+        weight = self._quadrics.matrix[left][:, [0, 3, 5]].sum(axis=1)
+        error2 = self._quadrics.linear[left, kernels.quadrics.CONSTANT]
+        errors: NDArray[np.float64] = np.sqrt(error2 / np.where(weight > 0.0, weight, 1.0))
         return errors
 
     def _stop(self, reasons: NDArray[np.str_], longest_edge: float) -> str:

@@ -17,7 +17,7 @@ from tetsimplify.engine import Engine
 from tetsimplify.options import Progress
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
+SHARES = (0.15, 0.02)  # of the edges are below the next threshold; the second near the end
 NEAR_END = 2.0  # times the faces asked for are left
 LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: triangles that become
 LENIENT = 4.0  # worse have time to become better again
@@ -74,7 +74,7 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
             divided=engine.is_divided and not n_barren,
         )
         n_barren = 0 if n_contracted else n_barren + 1
-        success = min(max(n_contracted / n_below, LEAST_SUCCESS), 1.0)
+        success = min(max(n_contracted / max(n_below, 1.0), LEAST_SUCCESS), 1.0)
         if least == np.inf:
             if retry and n_barren:
                 break
@@ -89,9 +89,7 @@ def is_near_end(engine: Engine) -> bool:
     return engine.n_faces <= NEAR_END * engine.min_faces
 
 
-def next_thresholds(
-    engine: Engine, least: float, n_barren: int = 0, success: float = 1.0
-) -> Round:
+def next_thresholds(engine: Engine, least: float, n_barren: int = 0, success: float = 1.0) -> Round:
     """Costs that growing shares of the edges are below, and no more than have to go.
 
     Parameters

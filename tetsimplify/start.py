@@ -18,6 +18,7 @@ from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options
 from tetsimplify.topology import TopologyReport, examine, topology
 
 if TYPE_CHECKING:
+    from tetsimplify.kernels.quadrics import Quadrics
     from tetsimplify.kernels.state import Scratch, Surface
 
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
@@ -111,7 +112,7 @@ def start_quadrics(
     options: Options,
     bound: NDArray[np.float64] | None,
     crew: Crew,
-) -> NDArray[np.float32]:
+) -> Quadrics:
     """The quadrics of all faces, and of boundary and feature edges; see kernels/quadrics.py.
 
     Parameters
@@ -127,9 +128,10 @@ def start_quadrics(
     """
     n = len(surface.vertices)
     limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
-    quadrics = _aligned_rows(n, kernels.quadrics.WIDTH)
-    quadrics[:, kernels.quadrics.MAX_ERROR2] = limit if bound is None else bound
-    quadrics[:, kernels.quadrics.MAX_ERROR2] *= np.abs(quadrics[:, kernels.quadrics.MAX_ERROR2])
+    quadrics = new_quadrics(n)
+    max_error2 = quadrics.origin[:, kernels.quadrics.MAX_ERROR2]
+    max_error2[:] = limit if bound is None else bound
+    max_error2 *= np.abs(max_error2)
     unit = _weight_unit(surface)
 
     def sum_faces(part: slice) -> None:
@@ -144,7 +146,7 @@ def start_quadrics(
         sharp = math.cos(math.radians(options.feature_angle))
     if sharp > -1.0 or surface.loop_size.any():
         weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
-        kernels.quadrics.add_creases(surface, quadrics, *weights, sharp)
+        kernels.quadrics.add_creases(surface, quadrics.matrix, *weights, sharp)
     return quadrics
 
 
@@ -155,12 +157,18 @@ def _weight_unit(surface: Surface) -> float:
     return float(2.0 ** round(math.log2(area))) if 0.0 < area < math.inf else 1.0
 
 
-def _aligned_rows(n: int, width: int) -> NDArray[np.float32]:
-    """Zeros, with every row in as few lines of a cache as can be."""
-    line = CACHE_LINE // 4
-    memory = np.zeros(n * width + line, np.float32)
-    first = -(memory.ctypes.data // 4) % line
-    return memory[first : first + n * width].reshape(n, width)
+def new_quadrics(n_vertices: int) -> Quadrics:
+    """Quadrics of so many vertices, all zero, each in one line of a cache."""
+    width = CACHE_LINE // 8
+    memory = np.zeros((n_vertices + 1) * width)
+    first = -(memory.ctypes.data // 8) % width
+    matrix = memory[first : first + n_vertices * width].reshape(n_vertices, width)
+    quadrics: Quadrics = kernels.quadrics.Quadrics(
+        matrix=matrix,
+        linear=matrix.view(np.float32),
+        origin=np.zeros((n_vertices, 8), np.float32),
+    )
+    return quadrics
 
 
 def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:

@@ -1,7 +1,5 @@
 """Blocks of faces, made of cells: pieces of the surface that were numbered along a curve."""
 
-import numpy as np
-
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.jit import kernel_in_place, part
 
@@ -47,15 +45,15 @@ def put_in_blocks(n_faces, least, block_of, place, begin):
     n_blocks, n_listed, first, filled = 0, 0, 0, 0
     for c in range(block_of.size):
         block_of[c] = n_blocks
-        for part in range(len(n_faces)):
-            filled += n_faces[part, c]
+        for p in range(len(n_faces)):
+            filled += n_faces[p, c]
         if filled < least[min(n_blocks, 1)] and c + 1 < block_of.size:
             continue
         begin[n_blocks] = n_listed
-        for part in range(len(n_faces)):
-            place[part, n_blocks] = n_listed
+        for p in range(len(n_faces)):
+            place[p, n_blocks] = n_listed
             for d in range(first, c + 1):
-                n_listed += n_faces[part, d]
+                n_listed += n_faces[p, d]
         n_blocks += 1
         first, filled = c + 1, 0
     begin[n_blocks] = n_listed

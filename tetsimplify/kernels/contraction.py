@@ -55,7 +55,10 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     """
     v = surface.corner_vertex[corner]
     u = surface.corner_vertex[ahead(corner)]
-    if surface.vertex_block[v] != scratch.tally[BLOCK] or surface.vertex_block[u] != scratch.tally[BLOCK]:
+    if (
+        surface.vertex_block[v] != scratch.tally[BLOCK]
+        or surface.vertex_block[u] != scratch.tally[BLOCK]
+    ):
         return OUTSIDE
     if surface.locked[v] and surface.locked[u]:
         return LOCKED
@@ -69,7 +72,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
         return ENOUGH
     placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
     if placed == CONTRACTIBLE and quadrics is not None:
-        placed = _judge(surface, quadrics, scratch, rules, v, u)
+        placed = _judge(quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and watch is not None:
         if star_crosses(watch, surface, scratch, v, u, n_v, n_u, n_doomed):
             placed = INTERSECTION
@@ -103,7 +106,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
         placed = ENOUGH
     if placed == CONTRACTIBLE and quadrics is not None:
         _add_removed(surface, quadrics, scratch, lens.first_removed)
-        placed = _judge(surface, quadrics, scratch, rules, v, u)
+        placed = _judge(quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and watch is not None:
         if star_crosses(watch, surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed):
             placed = INTERSECTION
@@ -128,12 +131,12 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
 
 
 @part
-def _judge(surface, quadrics, scratch, rules, v, u):
+def _judge(quadrics, scratch, rules, v, u):
     """Whether the place found, which need not be the best one, is within the bounds."""
-    error, terms = scratch.point[ERROR], quadrics
-    if error > (weight(terms, v) + weight(terms, u)) * error_bound(quadrics, v, u):
+    error = scratch.point[ERROR]
+    if error > (weight(quadrics, v) + weight(quadrics, u)) * error_bound(quadrics, v, u):
         return ERROR_BOUND
-    scratch.point[COST] = increase(terms, surface.vertices, v, u, error) * scratch.point[FACTOR]
+    scratch.point[COST] = increase(quadrics, v, u, error) * scratch.point[FACTOR]
     is_dear = scratch.point[COST] > scratch.point[MAX_PRICE] and not rules.by_length
     return TOO_DEAR if is_dear else CONTRACTIBLE
 
@@ -145,14 +148,14 @@ def _add_removed(surface, quadrics, scratch, vertex):
     Every vertex counts with the weight of its planes and its whole distance to the new vertex,
     which is more than the distance of the planes.
     """
-    terms, vertices, point = quadrics, surface.vertices, scratch.point
+    vertices, point = surface.vertices, scratch.point
     while vertex >= 0:
         distance2 = 0.0
         for axis in range(3):
             distance2 += (vertices[vertex, axis] - point[axis]) ** 2
-        if distance2 > quadrics[vertex, MAX_ERROR2]:
+        if distance2 > quadrics.origin[vertex, MAX_ERROR2]:
             point[ERROR] = np.inf
-        point[ERROR] += distance2 * weight(terms, vertex)
+        point[ERROR] += distance2 * weight(quadrics, vertex)
         vertex = scratch.nodes[FOLLOWER, vertex]
 
 

@@ -56,17 +56,16 @@ def _ranked_cost(surface, quadrics, rules, a, b):
         return np.inf, LOCKED
     if quadrics is None:
         return length2, CONTRACTIBLE
-    terms = quadrics
     x, y, z = (
         vertices[b, 0] - vertices[a, 0],
         vertices[b, 1] - vertices[a, 1],
         vertices[b, 2] - vertices[a, 2],
     )
     fixed = fixed_place(surface, a, b)
-    error = least_error(sum_at(terms, vertices, a, b), x, y, z, fixed, rules)[4]
-    if error > (weight(terms, a) + weight(terms, b)) * error_bound(quadrics, a, b):
+    error = least_error(sum_at(quadrics, vertices, a, b), x, y, z, fixed, rules)[4]
+    if error > (weight(quadrics, a) + weight(quadrics, b)) * error_bound(quadrics, a, b):
         return np.inf, ERROR_BOUND
-    return length2 if rules.by_length else increase(terms, vertices, a, b, error), CONTRACTIBLE
+    return length2 if rules.by_length else increase(quadrics, a, b, error), CONTRACTIBLE
 
 
 @part
@@ -77,7 +76,9 @@ def rank_face(surface, quadrics, rules, cost, f):
     corner has an infinite cost.
     """
     state = surface.face_state[f]
-    unchanged = (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1  # opposite of what moved
+    unchanged = (
+        (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1
+    )  # opposite of what moved
     surface.face_state[f] = RANKED
     for k in range(3):
         if k == unchanged:

@@ -69,11 +69,12 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
         CONTRACTIBLE, or the guard that forbids it.
     """
     vertices, corner_vertex, point = surface.vertices, surface.corner_vertex, scratch.point
+    origin = quadrics.origin
     px, py, pz = point[0], point[1], point[2]
-    sum_x = quadrics[v, NORMAL] + quadrics[u, NORMAL]
-    sum_y = quadrics[v, NORMAL + 1] + quadrics[u, NORMAL + 1]
-    sum_z = quadrics[v, NORMAL + 2] + quadrics[u, NORMAL + 2]
-    sum_area = quadrics[v, AREA] + quadrics[u, AREA]
+    sum_x = origin[v, NORMAL] + origin[u, NORMAL]
+    sum_y = origin[v, NORMAL + 1] + origin[u, NORMAL + 1]
+    sum_z = origin[v, NORMAL + 2] + origin[u, NORMAL + 2]
+    sum_area = origin[v, AREA] + origin[u, AREA]
     foldover = rules.cos_foldover * abs(rules.cos_foldover)
     deviation = rules.cos_deviation * abs(rules.cos_deviation)
     worst_old = worst_new = 1.0  # squares of the shapes
@@ -101,11 +102,11 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
             if old2 > FLAT * FLAT * old_sum * old_sum:
                 return FOLDOVER
         if rules.cos_deviation > NO_GUARD:
-            rx = sum_x + quadrics[a, NORMAL] + quadrics[b, NORMAL]
-            ry = sum_y + quadrics[a, NORMAL + 1] + quadrics[b, NORMAL + 1]
-            rz = sum_z + quadrics[a, NORMAL + 2] + quadrics[b, NORMAL + 2]
+            rx = sum_x + origin[a, NORMAL] + origin[b, NORMAL]
+            ry = sum_y + origin[a, NORMAL + 1] + origin[b, NORMAL + 1]
+            rz = sum_z + origin[a, NORMAL + 2] + origin[b, NORMAL + 2]
             r2 = rx * rx + ry * ry + rz * rz
-            cancelled = UNDECIDED * (sum_area + quadrics[a, AREA] + quadrics[b, AREA])
+            cancelled = UNDECIDED * (sum_area + origin[a, AREA] + origin[b, AREA])
             dot = rx * new_x + ry * new_y + rz * new_z
             if dot * abs(dot) < deviation * r2 * new2 and r2 > cancelled * cancelled:
                 return NORMAL_DEVIATION

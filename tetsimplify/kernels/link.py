@@ -24,7 +24,6 @@ from tetsimplify.kernels.state import (
     STAR,
 )
 
-
 GONE = np.uint32(2**32 + DEAD)  # the same, unsigned
 
 

@@ -7,25 +7,35 @@ place y, relative to the vertex itself, it is
 
 with the normal n and the weight w of each plane: its area, in units of about the mean area of the
 faces given, so that single precision is enough for meshes of any size. Relative to the vertex: so a
-mesh far from the origin loses nothing, and a quadric that is new has b = 0 and c = 0. Sums are
-computed in double precision and kept in single: distances from planes are right to 1e-4 of the
-size of what has been merged. The trace of A is the sum of the areas, so Q / trace(A) is a mean
-squared distance.
+mesh far from the origin loses nothing, and a quadric that is new has b = 0 and c = 0. The trace of A
+is the sum of the areas, so Q / trace(A) is a mean squared distance.
+
+On a plane the sum cancels to nothing, which only comes out when A is kept in double precision. b
+and c are small there, and single precision is enough for them.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, vertex_ahead, vertex_behind
-from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
 
-# Columns of the row of a vertex, which is as long as a line of a cache: the upper half of A, b
-# and c; the largest mean squared distance allowed; sums of the original normals, by area, and of
-# the areas.
-CONSTANT, MAX_ERROR2, NORMAL, AREA = 9, 10, 11, 14
-WIDTH = 16
+
+class Quadrics(NamedTuple):
+    """The quadrics of vertices: each in one line of a cache, and where it comes from."""
+
+    matrix: np.ndarray  # float64 (n, 8): the upper half of A by rows; the last two columns are
+    linear: np.ndarray  # float32 (n, 16): b and c, in the last four columns; the same memory
+    origin: np.ndarray  # float32 (n, 8): columns below
+
+
+LINEAR, CONSTANT = 12, 15  # columns of `linear`
+# Columns of `origin`: the largest mean squared distance allowed; sums of the original normals, by
+# area, and of the areas.
+MAX_ERROR2, NORMAL, AREA = 0, 1, 4
 
 # The optimum is held to the middle of the edge by a spring of this part of the weight: in
 # directions in which the planes do not decide, the middle does. So the solution is always well
@@ -33,18 +43,21 @@ WIDTH = 16
 STABILITY = 1e-3
 # So often the optimum is computed anew with the spring at the last one.
 REFINEMENTS = 4
-# What single precision leaves uncertain: so much of the weight times the squared length of the edge.
-ROUNDING = 2.0**-22
 # Farther than so many lengths of the edge from its middle no optimum is believed.
 MAX_REACH = 2.0
 
 
 @part
-def sum_at(terms, vertices, v, u):
+def sum_at(quadrics, vertices, v, u):
     """The quadrics of v and u together, relative to v: A by rows of its upper half, b, c."""
-    axx, axy, axz = np.float64(terms[u, 0]), np.float64(terms[u, 1]), np.float64(terms[u, 2])
-    ayy, ayz, azz = np.float64(terms[u, 3]), np.float64(terms[u, 4]), np.float64(terms[u, 5])
-    bx, by, bz = np.float64(terms[u, 6]), np.float64(terms[u, 7]), np.float64(terms[u, 8])
+    of_v, of_u = quadrics.matrix[v], quadrics.matrix[u]
+    axx, axy, axz, ayy, ayz, azz = of_u[0], of_u[1], of_u[2], of_u[3], of_u[4], of_u[5]
+    rest_v, rest_u = quadrics.linear[v], quadrics.linear[u]
+    bx, by, bz = (
+        np.float64(rest_u[LINEAR]),
+        np.float64(rest_u[LINEAR + 1]),
+        np.float64(rest_u[LINEAR + 2]),
+    )
     dx = vertices[v, 0] - vertices[u, 0]
     dy = vertices[v, 1] - vertices[u, 1]
     dz = vertices[v, 2] - vertices[u, 2]
@@ -52,17 +65,17 @@ def sum_at(terms, vertices, v, u):
     gy = axy * dx + ayy * dy + ayz * dz
     gz = axz * dx + ayz * dy + azz * dz
     return (
-        axx + terms[v, 0],
-        axy + terms[v, 1],
-        axz + terms[v, 2],
-        ayy + terms[v, 3],
-        ayz + terms[v, 4],
-        azz + terms[v, 5],
-        bx + gx + terms[v, 6],
-        by + gy + terms[v, 7],
-        bz + gz + terms[v, 8],
-        terms[u, CONSTANT] + (gx + 2.0 * bx) * dx + (gy + 2.0 * by) * dy + (gz + 2.0 * bz) * dz
-        + terms[v, CONSTANT],
+        axx + of_v[0],
+        axy + of_v[1],
+        axz + of_v[2],
+        ayy + of_v[3],
+        ayz + of_v[4],
+        azz + of_v[5],
+        bx + gx + rest_v[LINEAR],
+        by + gy + rest_v[LINEAR + 1],
+        bz + gz + rest_v[LINEAR + 2],
+        (gx + 2.0 * bx) * dx + (gy + 2.0 * by) * dy + (gz + 2.0 * bz) * dz
+        + rest_v[CONSTANT] + rest_u[CONSTANT],
     )  # fmt: skip
 
 
@@ -80,23 +93,21 @@ def value(q, x, y, z):
 
 
 @part
-def weight(terms, v):
+def weight(quadrics, v):
     """The sum of the weights of the planes of v."""
-    return terms[v, 0] + terms[v, 3] + terms[v, 5]
+    return quadrics.matrix[v, 0] + quadrics.matrix[v, 3] + quadrics.matrix[v, 5]
 
 
 @part
-def increase(terms, vertices, v, u, error):
-    """How much more the error is than those of v and u alone; zero below what is certain."""
-    more = error - terms[v, CONSTANT] - terms[u, CONSTANT]
-    rounded = ROUNDING * (weight(terms, v) + weight(terms, u)) * squared_length(vertices, v, u)
-    return more if more > rounded else 0.0
+def increase(quadrics, v, u, error):
+    """How much more the error is than those of v and u alone."""
+    return max(error - quadrics.linear[v, CONSTANT] - quadrics.linear[u, CONSTANT], 0.0)
 
 
 @part
 def error_bound(quadrics, v, u):
     """The largest mean squared distance that both v and u allow."""
-    return min(quadrics[v, MAX_ERROR2], quadrics[u, MAX_ERROR2])
+    return min(quadrics.origin[v, MAX_ERROR2], quadrics.origin[u, MAX_ERROR2])
 
 
 @part
@@ -134,32 +145,33 @@ def optimum(q, x, y, z):
 @part
 def merge_quadrics(surface, quadrics, scratch, v, u):
     """Make of v and u, which are still where they were, what stands for both at the new place."""
-    terms, vertices = quadrics, surface.vertices
-    q = sum_at(terms, vertices, v, u)
+    vertices = surface.vertices
+    q = sum_at(quadrics, vertices, v, u)
     axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
     x = scratch.point[0] - vertices[v, 0]
     y = scratch.point[1] - vertices[v, 1]
     z = scratch.point[2] - vertices[v, 2]
     for k in range(6):
-        terms[v, k] += terms[u, k]
-    terms[v, 6] = bx + axx * x + axy * y + axz * z
-    terms[v, 7] = by + axy * x + ayy * y + ayz * z
-    terms[v, 8] = bz + axz * x + ayz * y + azz * z
-    terms[v, CONSTANT] = scratch.point[ERROR]
-    terms[v, MAX_ERROR2] = error_bound(terms, v, u)
+        quadrics.matrix[v, k] += quadrics.matrix[u, k]
+    rest, origin = quadrics.linear[v], quadrics.origin
+    rest[LINEAR] = bx + axx * x + axy * y + axz * z
+    rest[LINEAR + 1] = by + axy * x + ayy * y + ayz * z
+    rest[LINEAR + 2] = bz + axz * x + ayz * y + azz * z
+    rest[CONSTANT] = scratch.point[ERROR]
+    origin[v, MAX_ERROR2] = error_bound(quadrics, v, u)
     for k in range(NORMAL, AREA + 1):
-        terms[v, k] += terms[u, k]
+        origin[v, k] += origin[u, k]
 
 
 @part
-def _add_plane(terms, v, scale, x, y, z):
+def _add_plane(matrix, v, scale, x, y, z):
     """Add the plane through v with a normal of any length; scale times its square is the weight."""
-    terms[v, 0] += scale * x * x
-    terms[v, 1] += scale * x * y
-    terms[v, 2] += scale * x * z
-    terms[v, 3] += scale * y * y
-    terms[v, 4] += scale * y * z
-    terms[v, 5] += scale * z * z
+    matrix[v, 0] += scale * x * x
+    matrix[v, 1] += scale * x * y
+    matrix[v, 2] += scale * x * z
+    matrix[v, 3] += scale * y * y
+    matrix[v, 4] += scale * y * z
+    matrix[v, 5] += scale * z * z
 
 
 @part
@@ -184,7 +196,7 @@ def mean_area(vertices, corner_vertex, step):
 
 
 @kernel_in_place
-def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, last, terms):
+def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, last, quadrics):
     """Sum the planes, the normals and the areas of the faces around the vertices from `first`.
 
     Parameters
@@ -213,14 +225,15 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
             c = next_corner[c]
             if c == first_corner[v]:
                 break
-        terms[v, 0], terms[v, 1], terms[v, 2] = xx / unit, xy / unit, xz / unit
-        terms[v, 3], terms[v, 4], terms[v, 5] = yy / unit, yz / unit, zz / unit
-        terms[v, NORMAL], terms[v, NORMAL + 1] = sum_x / unit, sum_y / unit
-        terms[v, NORMAL + 2], terms[v, AREA] = sum_z / unit, sum_area / unit
+        matrix, origin = quadrics.matrix[v], quadrics.origin[v]
+        matrix[0], matrix[1], matrix[2] = xx / unit, xy / unit, xz / unit
+        matrix[3], matrix[4], matrix[5] = yy / unit, yz / unit, zz / unit
+        origin[NORMAL], origin[NORMAL + 1] = sum_x / unit, sum_y / unit
+        origin[NORMAL + 2], origin[AREA] = sum_z / unit, sum_area / unit
 
 
 @kernel_in_place
-def add_creases(surface, terms, unit, boundary_weight, feature_weight, cos_feature):
+def add_creases(surface, matrix, unit, boundary_weight, feature_weight, cos_feature):
     """Hold boundary and feature edges by planes through them, upright on their faces.
 
     Parameters
@@ -256,4 +269,4 @@ def add_creases(surface, terms, unit, boundary_weight, feature_weight, cos_featu
         ey = vertices[b, 1] - vertices[a, 1]
         ez = vertices[b, 2] - vertices[a, 2]
         for v in (a, b):
-            _add_plane(terms, v, scale, y * ez - z * ey, z * ex - x * ez, x * ey - y * ex)
+            _add_plane(matrix, v, scale, y * ez - z * ey, z * ex - x * ez, x * ey - y * ex)
