@@ -1,5 +1,8 @@
 """The topology report against the oracle."""
 
+import dataclasses
+import importlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +12,10 @@ import meshes
 import naive
 import strategies
 import tetsimplify
+from tetsimplify import kernels
+from tetsimplify.topology import examine
+
+MODULE = importlib.import_module("tetsimplify.topology")  # the name is that of its verb
 
 BROKEN = [
     meshes.moebius_strip(),
@@ -139,3 +146,112 @@ def test_positions_do_not_matter():
     vertices, faces = meshes.octahedron()
     vertices[:] = np.nan
     assert tetsimplify.topology(vertices, faces).is_manifold
+
+
+# --- threads --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def threads_for_all(monkeypatch):
+    """Threads for small meshes too."""
+    monkeypatch.setattr(MODULE, "LEAST_FACES", 0)
+
+
+def as_bytes(examined):
+    """All that is found, to the last bit."""
+    report, loop, next_corner = examined
+    fields = {
+        name: value.tobytes() if isinstance(value, np.ndarray) else value
+        for name, value in dataclasses.asdict(report).items()
+    }
+    return fields, loop.tobytes(), next_corner.tobytes()
+
+
+def assert_threads_make_no_difference(vertices, faces):
+    corner_vertex = np.ascontiguousarray(faces, np.int32).reshape(-1)
+    expected = examine(corner_vertex, len(vertices), threads=1)
+    if len(corner_vertex):
+        assert (expected.next_corner >= 0).all()
+    _, next_corner, _ = kernels.corners.link_corners(corner_vertex, len(vertices))
+    assert np.array_equal(expected.next_corner, next_corner)
+    for threads in (2, 3, 8):
+        found = examine(corner_vertex, len(vertices), threads=threads)
+        assert as_bytes(found) == as_bytes(expected)
+
+
+@pytest.mark.parametrize("mesh", BROKEN)
+def test_threads_make_no_difference_to_broken_meshes(threads_for_all, mesh):
+    assert_threads_make_no_difference(*mesh)
+
+
+def test_threads_make_no_difference_to_adversarial_surfaces(threads_for_all):
+    """As they are, and with vertices in any order, so that ranges are tied together everywhere."""
+    for seed in range(200):
+        vertices, faces = strategies.adversarial_mesh(seed)
+        assert_threads_make_no_difference(vertices, faces)
+        rng = np.random.default_rng(seed)
+        assert_threads_make_no_difference(vertices, rng.permutation(len(vertices))[faces])
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(3, 9), st.integers(0, 25), st.integers(0, 2**32 - 1))
+def test_threads_make_no_difference_to_any_set_of_triangles(n_vertices, n_faces, seed):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(MODULE, "LEAST_FACES", 0)
+        faces = np.random.default_rng(seed).integers(0, n_vertices, (n_faces, 3))
+        assert_threads_make_no_difference(np.zeros((n_vertices, 3)), faces)
+
+
+def test_ranges_are_tied_together_and_agree_with_the_oracle(threads_for_all):
+    """Many pieces, with handles and boundaries, whose vertices are all over the ranges."""
+    pieces = [meshes.minimal_torus(), meshes.annulus(5), meshes.icosphere(1)] * 6
+    vertices, faces = meshes.disjoint_union(*pieces)
+    for seed in range(20):
+        place = np.random.default_rng(seed).permutation(len(vertices))
+        assert_agrees(vertices, place[faces])
+
+
+def test_tails_that_share_a_slot(threads_for_all):
+    """Neighbours whose numbers have the same last bits put one another out; no fault is found."""
+    vertices, faces = meshes.icosphere(2)
+    place = kernels.surface.SLOTS * np.arange(len(vertices)) + 1
+    report = tetsimplify.topology(np.zeros((place[-1] + 1, 3)), place[faces])
+    assert report.is_manifold and report.euler_characteristic == 2
+    assert report.edge_degrees == {2: 3 * len(faces) // 2}
+
+
+@pytest.mark.parametrize("valence", [63, 64, 65, 200])
+def test_vertices_of_many_faces(threads_for_all, valence):
+    """A double cone: more faces at its tips than there is room for are no fault."""
+    ring = np.arange(1, valence + 1)
+    after = np.roll(ring, -1)
+    tip = np.zeros(valence, int)
+    cone = np.column_stack([tip, ring, after])
+    closed = np.vstack([cone, np.column_stack([tip + valence + 1, after, ring])])
+    vertices = np.zeros((valence + 2, 3))
+    assert_threads_make_no_difference(vertices, closed)
+    assert tetsimplify.topology(vertices, closed).components.tolist() == [[2, 0]]
+    # one face turned round: the cycle is broken at both its ends and at the tip
+    closed[0] = closed[0, ::-1]
+    assert len(tetsimplify.topology(vertices, closed).inconsistent_edges) == 3
+
+
+def test_two_fans_of_as_many_faces_are_no_cycle(threads_for_all):
+    """Two octahedra that meet in a point: each of its two cycles comes back too early."""
+    vertices, faces = meshes.octahedron()
+    other = np.where(faces == 0, 0, faces + len(vertices))
+    both = np.vstack([faces, other])
+    report = tetsimplify.topology(np.zeros((2 * len(vertices), 3)), both)
+    assert report.non_manifold_vertices.tolist() == [0]
+    assert_threads_make_no_difference(np.zeros((2 * len(vertices), 3)), both)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "2"])
+def test_wrong_numbers_of_threads_are_refused(threads):
+    with pytest.raises(tetsimplify.OptionError, match="threads must be a positive integer"):
+        tetsimplify.topology(*meshes.octahedron(), threads=threads)
+
+
+def test_threads_go_with_arrays():
+    with pytest.raises(tetsimplify.OptionError, match="vertices and faces"):
+        tetsimplify.topology(object(), threads=2)

@@ -14,7 +14,7 @@ from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options
-from tetsimplify.topology import TopologyReport, analyse, topology
+from tetsimplify.topology import TopologyReport, examine, topology
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.state import Scratch, Surface
@@ -25,7 +25,11 @@ STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at
 
 
 def start_surface(
-    given: Mesh, arranged: Arrangement, options: Options, locked: NDArray[np.bool_]
+    given: Mesh,
+    arranged: Arrangement,
+    options: Options,
+    locked: NDArray[np.bool_],
+    threads: int | None = None,
 ) -> tuple[Surface, TopologyReport]:
     """The corner table of a mesh, and its topology.
 
@@ -37,6 +41,8 @@ def start_surface(
     options : Options
     locked : ndarray, shape (n,), bool
         In the order given.
+    threads : int, optional
+        How many threads to use.
 
     Raises
     ------
@@ -46,8 +52,7 @@ def start_surface(
     mesh = arranged.mesh
     n, m = len(mesh.vertices), len(mesh.faces)
     corner_vertex = mesh.faces.reshape(-1)
-    corners = kernels.corners.link_corners(corner_vertex, n)
-    report, loop = analyse(corner_vertex, *corners)
+    report, loop, next_corner = examine(corner_vertex, n, threads=threads)
     if not report.is_manifold:
         defects = topology(*given).defects()  # which are told in the order given
         raise MeshError(
@@ -56,12 +61,12 @@ def start_surface(
     unused = np.sort(arranged.vertex_origin[report.unreferenced_vertices])
     report = dataclasses.replace(report, unreferenced_vertices=unused)
 
-    held = _held_boundary(mesh.vertices, corner_vertex, corners[1], loop, options.boundary)
+    held = _held_boundary(mesh.vertices, corner_vertex, next_corner, loop, options.boundary)
     n_loops = max(1, report.n_boundary_loops)
     surface: Surface = kernels.state.Surface(
         vertices=mesh.vertices,
         corner_vertex=corner_vertex,
-        next_corner=corners[1],
+        next_corner=next_corner,
         face_state=np.full(m, kernels.state.STALE_ODD, np.uint8),
         face_block=np.zeros(m, np.int32),
         verdict=np.zeros(3 * m, np.uint8),

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetsimplify import adapters, kernels
 from tetsimplify.arrays import as_mesh, listed
+from tetsimplify.crew import Crew
+from tetsimplify.errors import OptionError
 
 Indices = NDArray[np.int32]
+
+LEAST_FACES = 2**16  # starting threads for fewer takes longer than the work
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,9 @@ class TopologyReport:
         return "; ".join(found) or None
 
 
-def topology(vertices: Any, faces: ArrayLike | None = None) -> TopologyReport:
+def topology(
+    vertices: Any, faces: ArrayLike | None = None, *, threads: int | None = None
+) -> TopologyReport:
     """Tell the topology of a triangle mesh.
 
     Parameters
@@ -108,6 +114,9 @@ def topology(vertices: Any, faces: ArrayLike | None = None) -> TopologyReport:
         that an adapter is installed for.
     faces : array_like, shape (m, 3), integers
         Vertex indices.
+    threads : int, optional
+        How many threads to use for more than 65,536 faces; all that the process may if not given.
+        The report is the same.
 
     Returns
     -------
@@ -117,6 +126,8 @@ def topology(vertices: Any, faces: ArrayLike | None = None) -> TopologyReport:
     ------
     MeshError
         When the arrays have the wrong shape or dtype or indices are out of range.
+    OptionError
+        When `threads` is no positive integer, or goes with a mesh object.
 
     Examples
     --------
@@ -126,38 +137,95 @@ def topology(vertices: Any, faces: ArrayLike | None = None) -> TopologyReport:
     (1, 1, {1: 3})
     """
     if faces is None:
+        if threads is not None:
+            raise OptionError("threads go with vertices and faces, not with a mesh object")
         return adapters.topology(vertices)
     mesh = as_mesh(vertices, faces, finite=False)
-    corner_vertex = mesh.faces.reshape(-1)
-    corners = kernels.corners.link_corners(corner_vertex, len(mesh.vertices))
-    return analyse(corner_vertex, *corners)[0]
+    return examine(mesh.faces.reshape(-1), len(mesh.vertices), threads=threads).report
 
 
-def analyse(
-    corner_vertex: Indices, first_corner: Indices, next_corner: Indices, longest_link: int
-) -> tuple[TopologyReport, Indices]:
-    """Report on a corner table, and number its boundary loops.
+class Examined(NamedTuple):
+    """What :func:`examine` finds."""
 
-    Returns
-    -------
-    report : TopologyReport
-    loop : ndarray, shape (n_vertices,), int32
-        The boundary loop of each vertex, -1 inside.
+    report: TopologyReport
+    loop: Indices
+    """Shape (n,): the number of the boundary loop of each vertex, -1 inside."""
+    next_corner: Indices
+    """Shape (3 m,): the corner table, as of `kernels.corners.link_corners`."""
+
+
+def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = None) -> Examined:
+    """Link the corners of a mesh, report on its topology and number its boundary loops.
+
+    Parameters
+    ----------
+    corner_vertex : ndarray, shape (3 m,), int32
+        The vertex of each corner, within range.
+    n_vertices : int
+    threads : int, optional
+        As of :func:`topology`.
     """
-    found = kernels.surface.survey(corner_vertex, first_corner, next_corner, longest_link)
-    irregular = np.flatnonzero(found.is_irregular).astype(np.int32)
-    defects = kernels.defects.none()
-    if len(irregular):
-        defects = kernels.defects.inspect(
-            corner_vertex, first_corner, next_corner, longest_link, found, irregular
+    crew = Crew(threads)
+    n_threads = crew.n_threads if len(corner_vertex) > 3 * LEAST_FACES else 1
+    numbers = [np.empty(n_vertices, np.int32) for _ in range(5)]
+    first_corner, component, euler, loop, lower = numbers
+    found = kernels.surface.Survey(
+        first_corner=first_corner,
+        next_corner=np.empty(len(corner_vertex), np.int32),
+        component=component,
+        euler=euler,
+        loop=loop,
+        left=np.empty(n_vertices, np.uint8),
+        lower=lower,
+    )
+
+    def survey(part: slice) -> tuple[int, int, int]:
+        arcs = np.empty((2, kernels.surface.MOST_ARCS), np.int32)
+        slots = np.full((2, kernels.surface.SLOTS), -1, np.int64)
+        counts: tuple[int, int, int]
+        counts = kernels.surface.survey_inside(
+            corner_vertex, part.start, part.stop, found, arcs, slots
         )
-    n_loops = kernels.surface.number_loops(found.loop)
+        return counts
+
+    counts = crew.share(survey, n_vertices, max(1, -(-n_vertices // n_threads)))
+    n_edges, n_left = (sum(part[k] for part in counts) for k in range(2))
+    longest = max((part[2] for part in counts), default=0)
+    n_boundary = n_degenerate = 0
+    defects = kernels.defects.none()
+    if n_left:
+        rest = np.flatnonzero(found.left).astype(np.int32)
+        arcs, slot = np.empty((4, longest + 1), np.int32), np.empty(n_vertices, np.int32)
+        n_more, n_boundary, n_degenerate, n_irregular = kernels.surface.survey_rest(
+            corner_vertex, found, rest, arcs, slot
+        )
+        n_edges += n_more
+        if n_irregular:
+            irregular = rest[:n_irregular]
+            defects = kernels.defects.inspect(corner_vertex, found, irregular, longest)
+    report = _report(corner_vertex, found, defects, n_edges, n_boundary, n_degenerate)
+    return Examined(report, found.loop, found.next_corner)
+
+
+def _report(
+    corner_vertex: Indices,
+    found: Any,
+    defects: Any,
+    n_edges: int,
+    n_boundary_edges: int,
+    n_degenerate: int,
+) -> TopologyReport:
+    """Put the report together, and number the boundary loops in `found`."""
+    n_edges += defects.n_edges
+    n_boundary_edges += defects.n_boundary_edges
+    n_loops = kernels.surface.number_loops(found.loop) if n_boundary_edges else 0
     components = kernels.surface.component_topology(
         found.component, found.euler, found.loop, n_loops
     )
-
-    n_edges = found.n_edges + defects.n_edges
-    n_boundary_edges = found.n_boundary_edges + defects.n_boundary_edges
+    degenerate = np.empty(0, np.int32)
+    if n_degenerate:
+        a, b, c = corner_vertex.reshape(-1, 3).T
+        degenerate = np.flatnonzero((a == b) | (b == c) | (c == a)).astype(np.int32)
     bad_edges = defects.non_manifold_edges[: defects.n_non_manifold_edges]
     degrees, counts = np.unique(bad_edges[:, 2], return_counts=True)
     edge_degrees = {
@@ -165,9 +233,8 @@ def analyse(
         2: n_edges - n_boundary_edges - len(bad_edges),
         **dict(zip(degrees.tolist(), counts.tolist(), strict=True)),
     }
-    a, b, c = corner_vertex.reshape(-1, 3).T
-    report = TopologyReport(
-        n_vertices=len(first_corner),
+    return TopologyReport(
+        n_vertices=len(found.component),
         n_faces=len(corner_vertex) // 3,
         n_edges=n_edges,
         euler_characteristic=int(components[:, 0].sum()),
@@ -180,7 +247,6 @@ def analyse(
         non_manifold_vertices=defects.non_manifold_vertices[: defects.n_non_manifold_vertices],
         inconsistent_edges=defects.inconsistent_edges[: defects.n_inconsistent_edges],
         duplicate_faces=np.sort(defects.duplicate_faces[: defects.n_duplicate_faces]),
-        degenerate_faces=np.flatnonzero((a == b) | (b == c) | (c == a)).astype(np.int32),
+        degenerate_faces=degenerate,
         unreferenced_vertices=np.flatnonzero(found.component < 0).astype(np.int32),
     )
-    return report, found.loop

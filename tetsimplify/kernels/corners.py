@@ -31,6 +31,15 @@ def behind(corner):
     return corner + 2 if corner % 3 == 0 else corner - 1
 
 
+@part
+def others(corner_vertex, corner):
+    """The vertices of the corners ahead and behind, in half the time of asking for each."""
+    k = np.uint32(corner) % np.uint32(3)  # a product and a shift; signed numbers take more
+    first = corner - k
+    a = corner_vertex[first + (k == 0) + 2 * (k == 1)]
+    return a, corner_vertex[first + 2 * (k == 0) + (k == 2)]
+
+
 @kernel
 def link_corners(corner_vertex, n_vertices):
     """Link the live corners of each vertex into a circular list.

@@ -90,17 +90,18 @@ def _twins(link, v, tail, head, corners, n_arcs, k, faces, n_faces):
 
 
 @kernel
-def inspect(corner_vertex, first_corner, next_corner, longest_link, found, irregular):
+def inspect(corner_vertex, found, irregular, longest_link):
     """Look closely at the vertices that the survey found irregular; see :class:`Defects`.
 
     The Euler characteristics and the boundary loops of `found` are completed in place.
     """
+    first_corner, next_corner = found.first_corner, found.next_corner
     size = longest_link + 1
     tail, head = np.empty(size, np.int32), np.empty(size, np.int32)
     corners = np.empty(size, np.int32)
     n_total = 0
     for v in irregular:
-        n_total += link_arcs(corner_vertex, next_corner, first_corner[v], tail, head, corners)
+        n_total += link_arcs(corner_vertex, next_corner, first_corner[v], tail, head, corners)[0]
     link = LinkGraph(
         np.zeros(first_corner.size, np.int32),
         np.empty(2 * size, np.int32),
@@ -117,7 +118,7 @@ def inspect(corner_vertex, first_corner, next_corner, longest_link, found, irreg
     n_edges = n_boundary = n_bad = n_clashes = n_vertices = n_twins = 0
 
     for v in irregular:
-        n_arcs = link_arcs(corner_vertex, next_corner, first_corner[v], tail, head, corners)
+        n_arcs, _ = link_arcs(corner_vertex, next_corner, first_corner[v], tail, head, corners)
         k = _build(link, tail, head, n_arcs)
         n_edges_here = 0
         for j in range(k):

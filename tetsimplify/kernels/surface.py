@@ -7,47 +7,57 @@ At a vertex v every face gives an arc n -> p of the link of v:
       / f' \                  Anything else is irregular and left to defects.py.
      /      \
     p' --- v --- n
+
+Nearly all vertices of nearly all surfaces are inside. `survey_inside` takes these, in threads, each
+of which has a range of the vertices and writes to nothing else. What it does not take is left to
+`survey_rest`, one after the other: the boundary, what is irregular, vertices of very many faces,
+and what ties two ranges together.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead, behind
+from tetsimplify.kernels.corners import others
 from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 from tetsimplify.kernels.sets import find, unite
 
 CYCLE, PATH, IRREGULAR = 1, 0, -1
+SETTLED, LEFT, ACROSS = 0, 1, 2  # in `left`
+MOST_ARCS = 64  # of a vertex, more are left
+SLOTS = 2**12  # for the tails of arcs, by the last bits of their numbers: they fit a cache
+RUN = 2**12  # corners that are passed over at once where none has a vertex of the range
 
 
 class Survey(NamedTuple):
-    """What :func:`survey` finds; the irregular vertices are not counted yet."""
+    """What is found out; filled by `survey_inside`, range by range, then by `survey_rest`."""
 
-    n_edges: int
-    n_boundary_edges: int
+    first_corner: np.ndarray  # int32 (n,): a corner of each vertex, -1 where it has none
+    next_corner: np.ndarray  # int32 (3 m,): the corner table
     component: np.ndarray  # int32 (n,): disjoint sets of vertices, -1 where unreferenced
     euler: np.ndarray  # int32 (n,): Euler characteristic, at the root of each component
     loop: np.ndarray  # int32 (n,): disjoint sets of boundary vertices, -1 inside
-    is_irregular: np.ndarray  # bool (n,): the link of the vertex is no cycle and no path
+    left: np.ndarray  # uint8 (n,): LEFT where the vertex is, ACROSS where `lower` is
+    lower: np.ndarray  # int32 (n,): a vertex of another range and the same component
 
 
 @part
 def link_arcs(corner_vertex, next_corner, start, tail, head, corners):
-    """Collect the arcs of the link of the vertex of corner `start`; return their number.
+    """Collect the arcs of the link of the vertex of corner `start`.
 
-    Degenerate faces are passed over.
+    Degenerate faces are passed over. Returns the numbers of arcs and of corners.
     """
     v = corner_vertex[start]
-    n = 0
+    n = n_corners = 0
     c = start
     while True:
-        tail[n] = corner_vertex[ahead(c)]
-        head[n] = corner_vertex[behind(c)]
+        tail[n], head[n] = others(corner_vertex, c)
         corners[n] = c
+        n_corners += 1
         n += tail[n] != v and head[n] != v and tail[n] != head[n]
         c = next_corner[c]
         if c == start:
-            return n
+            return n, n_corners
 
 
 @part
@@ -96,57 +106,201 @@ def chain_arcs(tail, head, n_arcs, slot, successor):
     return IRREGULAR, 0, 0  # two arcs lead into one vertex
 
 
-@kernel
-def survey(corner_vertex, first_corner, next_corner, longest_link):
-    """Pass over the vertices once; see :class:`Survey`."""
-    n_vertices = first_corner.size
-    component = np.empty(n_vertices, np.int32)
-    euler = np.zeros(n_vertices, np.int32)
-    loop = np.empty(n_vertices, np.int32)
-    is_irregular = np.zeros(n_vertices, np.bool_)
-    slot = np.empty(n_vertices, np.int32)  # sparse set: where a vertex stands in `tail`
-    for v in range(n_vertices):
-        component[v] = v
-        loop[v] = -1
-        slot[v] = -1
-    tail = np.empty(longest_link + 1, np.int32)
-    head = np.empty(longest_link + 1, np.int32)
-    corners = np.empty(longest_link + 1, np.int32)
-    successor = np.empty(longest_link + 1, np.int32)
-    n_edges = 0
-    n_boundary = 0
+@part
+def _link_range(corner_vertex, first, last, first_corner, next_corner):
+    """Link the corners of the vertices from `first` to `last`, each to the one before.
 
-    for v in range(n_vertices):
-        n_arcs = 0
-        if first_corner[v] >= 0:
-            n_arcs = link_arcs(corner_vertex, next_corner, first_corner[v], tail, head, corners)
+    The earliest corner of a vertex is linked to -1, and `first_corner` is the latest one.
+    """
+    for v in range(first, last):
+        first_corner[v] = -1
+    least, above = np.int32(first), np.int32(last)
+    for begin in range(0, corner_vertex.size, RUN):
+        run = corner_vertex[begin : begin + RUN]
+        low = high = run[0]
+        for i in range(run.size):  # one after the other, so that both take many at once
+            low = min(low, run[i])
+        for i in range(run.size):
+            high = max(high, run[i])
+        if high < least or low >= above:
+            continue
+        for i in range(run.size):
+            v = run[i]
+            if least <= v < above:
+                next_corner[begin + i] = first_corner[v]
+                first_corner[v] = begin + i
+
+
+@kernel_in_place
+def survey_inside(corner_vertex, first, last, found, arcs, slots):
+    """Link the corners of a range of vertices, and survey those that are inside the surface.
+
+    The circular lists are those of `corners.link_corners`.
+
+    Parameters
+    ----------
+    corner_vertex : int32 (3 m,)
+    first, last : int
+        The range.
+    found : Survey
+        Filled for the vertices of the range and their corners.
+    arcs : int32 (2, MOST_ARCS)
+        Working memory.
+    slots : int64 (2, SLOTS)
+        Working memory, filled with -1. Where the tail of an arc is looked up: for which vertex and
+        tail the entry was made last, and the head.
+
+    Returns
+    -------
+    n_edges : int
+        Edges whose lower vertex is settled here.
+    n_left : int
+        Vertices that have something left.
+    longest : int
+        The largest number of corners of a vertex.
+    """
+    first_corner, next_corner, left = found.first_corner, found.next_corner, found.left
+    component, euler = found.component, found.euler
+    tail, head = arcs[0], arcs[1]
+    entry, successor = slots[0], slots[1]
+    last_slot = SLOTS - 1
+    _link_range(corner_vertex, first, last, first_corner, next_corner)
+    n_edges = n_left = longest = 0
+    for v in range(first, last):
+        component[v] = v
+        euler[v] = 0
+        found.loop[v] = -1
+        left[v] = SETTLED
+        corner = first_corner[v]
+        if corner < 0:
+            component[v] = -1
+            continue
+        latest = corner
+        stamp = np.int64(v) << 32
+        n_arcs = n_faces_here = n_edges_here = n_runs = 0
+        lower = np.int32(0)
+        while True:
+            a, b = others(corner_vertex, corner)
+            i = n_arcs & (MOST_ARCS - 1)
+            tail[i], head[i] = a, b
+            entry[a & last_slot], successor[a & last_slot] = stamp | a, b
+            n_arcs += 1
+            # edges and faces count at their lowest vertex
+            n_edges_here += a > v
+            n_faces_here += (a > v) & (b > v)
+            begins = (a < v) & (b > v)
+            n_runs += begins
+            lower = a if begins else lower
+            if next_corner[corner] < 0:
+                break
+            corner = next_corner[corner]
+        next_corner[corner] = latest
+        first_corner[v] = corner
+        longest = max(longest, n_arcs)
+
+        # One cycle, if heads lead from arc to arc, and back just after as many as there are: then
+        # these are different ones, and so they are all. A vertex that was put out of its slot by
+        # another one only makes this fail.
+        begin = np.int64(head[0])
+        w = begin
+        n_followed = 0
+        while n_followed < n_arcs <= MOST_ARCS and entry[w & last_slot] == stamp | w:
+            w = successor[w & last_slot]
+            n_followed += 1
+            if w == begin:
+                break
+        is_cycle = n_followed == n_arcs and w == begin and n_arcs > 2
+
+        # Two neighbours that follow one another in the link have an edge of their own. So of lower
+        # ones that do, one is joined here, and the others are joined to that elsewhere.
+        if n_runs == 0 and n_edges_here == 0:
+            n_runs, lower = 1, tail[0]
+        if is_cycle and n_runs > 1:
+            for i in range(n_arcs):
+                is_cycle &= not (tail[i] < first and head[i] > v)
+        if not is_cycle:
+            left[v] = LEFT
+            n_left += 1
+            continue
+        euler[v] = 1 - n_edges_here + n_faces_here
+        n_edges += n_edges_here
+        if n_runs == 1 and lower < first:
+            left[v] = ACROSS
+            found.lower[v] = lower
+            n_left += 1
+        elif n_runs == 1:
+            join_component(component, euler, v, lower)
+        elif n_runs > 1:
+            for i in range(n_arcs):
+                if tail[i] < v and head[i] > v:
+                    join_component(component, euler, v, tail[i])
+    return n_edges, n_left, longest
+
+
+@kernel_in_place
+def survey_rest(corner_vertex, found, rest, arcs, slot):
+    """Survey the vertices that have something left.
+
+    Parameters
+    ----------
+    corner_vertex : int32 (3 m,)
+    found : Survey
+        Completed, but for the edges of irregular vertices.
+    rest : int32 (k,)
+        The vertices that are not SETTLED. Receives those whose link is no cycle and no path.
+    arcs : int32 (4, longest + 1)
+        Working memory for the largest number of corners of a vertex.
+    slot : int32 (n,)
+        Working memory: where a vertex stands among the arcs, if it does.
+
+    Returns
+    -------
+    n_edges : int
+        Edges whose lower vertex is settled here.
+    n_boundary : int
+        Boundary edges among them.
+    n_degenerate : int
+        Corners of degenerate faces that were met, no less than one for each.
+    n_irregular : int
+        How many vertices `rest` has received.
+    """
+    next_corner, loop = found.next_corner, found.loop
+    component, euler = found.component, found.euler
+    tail, head, corners, successor = arcs[0], arcs[1], arcs[2], arcs[3]
+    n_edges = n_boundary = n_degenerate = n_irregular = 0
+    for v in rest:
+        if found.left[v] == ACROSS:
+            join_component(component, euler, v, found.lower[v])
+            continue
+        n_arcs, n_corners = link_arcs(
+            corner_vertex, next_corner, found.first_corner[v], tail, head, corners
+        )
+        n_degenerate += n_corners - n_arcs
         if n_arcs == 0:
             component[v] = -1
             continue
-        kind, first, last = chain_arcs(tail, head, n_arcs, slot, successor)
-
-        # edges and faces count at their lowest vertex
+        kind, begin, end = chain_arcs(tail, head, n_arcs, slot, successor)
         n_faces_here = 0
         n_edges_here = 0
         for i in range(n_arcs):
             n_faces_here += tail[i] > v and head[i] > v
             n_edges_here += tail[i] > v
         if kind == PATH:
-            n_edges_here += head[last] > v
-            n_boundary += join_loop(loop, v, tail[first]) + join_loop(loop, v, head[last])
+            n_edges_here += head[end] > v
+            n_boundary += join_loop(loop, v, tail[begin]) + join_loop(loop, v, head[end])
         elif kind == IRREGULAR:
-            is_irregular[v] = True
+            rest[n_irregular] = v
+            n_irregular += 1
             n_edges_here = 0
         n_edges += n_edges_here
 
-        euler[v] = 1 - n_edges_here + n_faces_here
+        euler[find(component, v)] += 1 - n_edges_here + n_faces_here
         for i in range(n_arcs):
             if tail[i] < v:
                 join_component(component, euler, v, tail[i])
             if kind != CYCLE and head[i] < v:
                 join_component(component, euler, v, head[i])
-
-    return Survey(n_edges, n_boundary, component, euler, loop, is_irregular)
+    return n_edges, n_boundary, n_degenerate, n_irregular
 
 
 @part
