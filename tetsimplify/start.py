@@ -29,7 +29,7 @@ def start_surface(
     arranged: Arrangement,
     options: Options,
     locked: NDArray[np.bool_],
-    threads: int | None = None,
+    threads: int | None = 1,
 ) -> tuple[Surface, TopologyReport]:
     """The corner table of a mesh, and its topology.
 
@@ -41,8 +41,8 @@ def start_surface(
     options : Options
     locked : ndarray, shape (n,), bool
         In the order given.
-    threads : int, optional
-        How many threads to use.
+    threads : int or None
+        How many threads to use, None for all that the process may.
 
     Raises
     ------
