@@ -161,8 +161,8 @@ def surface_distance(
     if tolerance is None:
         tolerance = DEFAULT_TOLERANCE * (frame.diagonal or 1.0)
     _check_length("tolerance", tolerance, SMALLEST_TOLERANCE * frame.diagonal)
-    crew = Crew(threads, progress, "distance", n_tasks=8)
-    target_a, target_b = Target(mesh_a, frame), Target(mesh_b, frame)
+    crew = Crew(threads, progress, "distance", n_tasks=10)
+    target_a, target_b = Target(mesh_a, frame, crew), Target(mesh_b, frame, crew)
     return SurfaceDistance(
         a_to_b=_Direction(target_a, target_b, crew).measure(tolerance),
         b_to_a=_Direction(target_b, target_a, crew).measure(tolerance),

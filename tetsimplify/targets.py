@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
+from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
 
 Points = NDArray[np.float64]
@@ -60,6 +61,8 @@ class Target:
         Checked arrays, with one face at least.
     frame : Frame, optional
         That of the mesh if not given.
+    crew : Crew, optional
+        Threads to make it with; one if not given.
 
     Attributes
     ----------
@@ -68,14 +71,18 @@ class Target:
         What the kernels work on, in the coordinates of the frame.
     """
 
-    def __init__(self, mesh: Mesh, frame: Frame | None = None) -> None:
+    def __init__(self, mesh: Mesh, frame: Frame | None = None, crew: Crew | None = None) -> None:
         self.frame = frame or Frame.around(mesh)
         vertices = self.frame.enter(mesh.vertices)
-        corner_vertex = mesh.faces.reshape(-1)
-        first_corner, next_corner, _ = kernels.corners.link_corners(corner_vertex, len(vertices))
-        self.arrays = kernels.nearest.Target(
-            vertices=vertices,
-            faces=mesh.faces,
-            tree=kernels.bvh.build(vertices, mesh.faces),
-            is_open=kernels.cover.open_faces(corner_vertex, first_corner, next_corner),
-        )
+
+        def tree() -> Any:
+            return kernels.bvh.build(vertices, mesh.faces)
+
+        def is_open() -> Any:
+            corner_vertex = mesh.faces.reshape(-1)
+            first, following, _ = kernels.corners.link_corners(corner_vertex, len(vertices))
+            return kernels.cover.open_faces(corner_vertex, first, following)
+
+        tasks = tree, is_open
+        made = (crew or Crew(1)).share(lambda part: tasks[part.start](), len(tasks), 1)
+        self.arrays = kernels.nearest.Target(vertices, mesh.faces, *made)

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tetsimplify.crew import Crew
 from tetsimplify.distance import SMALLEST_TOLERANCE, exceeds
 from tetsimplify.engine import Engine, Result
 from tetsimplify.errors import OptionError
@@ -55,7 +56,7 @@ def run_within(
     if options.max_quadric_error is not None:
         most = min(most, options.max_quadric_error)
     bound = np.full(len(given.vertices), most)
-    before = Target(given) if len(given.faces) else None
+    before = Target(given, crew=Crew(threads)) if len(given.faces) else None
     if before is not None and limit < SMALLEST_TOLERANCE * before.frame.diagonal / SLACK:
         least = SMALLEST_TOLERANCE / SLACK
         raise OptionError(f"max_error must be at least {least:g} of the diagonal, got {limit:g}")
@@ -66,7 +67,7 @@ def run_within(
         n_rounds += 1
         if before is None:
             return engine, n_rounds
-        reported = _too_far(given, before, engine.result, limit)
+        reported = _too_far(given, before, engine.result, limit, threads)
         if not len(reported.vertices):
             return engine, n_rounds
         _reduce(bound, engine.result, reported, limit, is_last=n_rounds >= PATIENCE)
@@ -79,13 +80,15 @@ class _Reported(NamedTuple):
     distances: NDArray[np.float64]
 
 
-def _too_far(given: Mesh, before: Target, result: Result, limit: float) -> _Reported:
+def _too_far(
+    given: Mesh, before: Target, result: Result, limit: float, threads: int | None
+) -> _Reported:
     """Compare the surfaces, and tell which vertices given were merged where they differ."""
     made = Mesh(result.vertices, result.faces)
-    after = Target(made, before.frame)
+    after = Target(made, before.frame, Crew(threads))
     limit, slack = (1.0 - ROUNDING) * limit, SLACK * limit
-    lost = exceeds(given, after, limit, slack=slack)
-    new = exceeds(made, before, limit, slack=slack)
+    lost = exceeds(given, after, limit, slack=slack, threads=threads)
+    new = exceeds(made, before, limit, slack=slack, threads=threads)
     of_given = np.zeros(len(given.vertices))
     np.maximum.at(of_given, given.faces[lost.faces], lost.distances[:, None])
     of_made = np.zeros(len(made.vertices) + 1)  # the last one is for what was removed

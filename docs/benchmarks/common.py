@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import platform
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 from rich.table import Table
 
 import tetsimplify
@@ -73,6 +75,20 @@ TOOLS = (
 )
 
 
+def wanted_tools(arguments: argparse.Namespace, tools: Sequence[Tool]) -> list[Tool]:
+    """Those of the command line, or all."""
+    parts = arguments.tools
+    return [tool for tool in tools if parts is None or any(part in tool.name for part in parts)]
+
+
+def installed(tools: Sequence[Tool]) -> tuple[list[Tool], list[str]]:
+    """Those that can run, and the names of the others."""
+    return (
+        [tool for tool in tools if tool.is_installed],
+        [tool.name for tool in tools if not tool.is_installed],
+    )
+
+
 # --- the surface -----------------------------------------------------------------------------
 
 
@@ -119,6 +135,35 @@ def seconds_of(times: list[Times], clock: str) -> Seconds:
     return [entry[clock] for entry in times]
 
 
+@dataclass
+class Outcome:
+    """What one tool did in one case."""
+
+    tool: str
+    times: list[Times] = field(default_factory=list)
+    n_faces: int = 0
+    euler_characteristic: int = 0
+    edges_of_degree_above_2: int = 0
+    duplicate_faces: int = 0
+    degenerate_faces: int = 0
+    same_topology: bool = False
+
+    def look_at(self, result: Mesh, given: Mesh) -> None:
+        """Look at the topology of a result."""
+        found = tetsimplify.topology(*result)
+        self.n_faces = found.n_faces
+        self.euler_characteristic = found.euler_characteristic
+        self.edges_of_degree_above_2 = len(found.non_manifold_edges)
+        self.duplicate_faces = len(found.duplicate_faces)
+        self.degenerate_faces = len(found.degenerate_faces)
+        self.same_topology = found.same_topology(tetsimplify.topology(*given))
+
+
+def as_result(vertices: Any, faces: Any) -> Mesh:
+    """The arrays that a tool gives, in our types and nothing else changed."""
+    return Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+
+
 def machine() -> dict[str, Any]:
     """What this ran on."""
     cpu = platform.processor()
@@ -144,6 +189,22 @@ def spread(seconds: Seconds) -> str:
     return f"{statistics.median(seconds):.3g} ({min(seconds):.3g} to {max(seconds):.3g})"
 
 
+def signed(n: int) -> str:
+    """A number with a real minus."""
+    return f"{n:,}".replace("-", "\N{MINUS SIGN}")
+
+
+def time_columns(name: str, seconds: Seconds, reference: Seconds, n_faces: int) -> Row:
+    """The first columns of a comparison; `reference` are the seconds that the ratio is to."""
+    ratio = statistics.median(seconds) / statistics.median(reference) if seconds else 0.0
+    return {
+        "tool": name,
+        "seconds, median (min to max)": spread(seconds) if seconds else "",
+        "ratio": f"{ratio:.2f}" if seconds else "",
+        "faces": f"{n_faces:,}",
+    }
+
+
 def as_rich(title: str, rows: list[Row]) -> Table:
     """A table for the terminal."""
     table = Table(title=title, title_justify="left")
@@ -159,3 +220,36 @@ def as_markdown(title: str, rows: list[Row]) -> str:
     names = list(rows[0])
     lines = [names, ["---", *["---:"] * (len(names) - 1)], *(list(row.values()) for row in rows)]
     return f"### {title}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def add_options(parser: argparse.ArgumentParser, repeats: int = 5) -> None:
+    """What all comparisons can be told."""
+    parser.add_argument("--repeats", type=int, default=repeats, help="runs of every tool")
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
+    parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
+    parser.add_argument("--json", type=Path, help="file for all figures")
+    parser.add_argument("--markdown", type=Path, help="file to write the tables to")
+
+
+def tell(
+    tables: list[tuple[str, list[Row]]], figures: dict[str, Any], markdown: Path | None
+) -> None:
+    """Show tables in the terminal, with what they were measured on, and write them to a file."""
+    out = Console()
+    out.width = max(out.width, WIDTH)
+    for title, rows in tables:
+        out.print(as_rich(title, rows))
+    if figures["absent"]:
+        out.print(f"not installed: {', '.join(figures['absent'])}")
+    out.print(figures["machine"])
+    if markdown:
+        text = "\n".join(as_markdown(title, rows) for title, rows in tables)
+        markdown.write_text(text, encoding="utf-8")
+
+
+def write_between(page: Path, name: str, text: str) -> None:
+    """Put a text between the marks of a name in a page."""
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+    before, rest = page.read_text(encoding="utf-8").split(begin)
+    after = rest.split(end)[1]
+    page.write_text(f"{before}{begin}\n{text.strip()}\n\n{end}{after}", encoding="utf-8")

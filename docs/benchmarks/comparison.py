@@ -12,13 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from common import Row, as_markdown
+from common import Row, as_markdown, signed, write_between
 
 from tetsimplify.comparison.tables import criterion_in_words, three_digits
 
 PAGE = Path(__file__).parents[1] / "benchmarks.md"
 NONE = "\N{EN DASH}"
-BEGIN, END = "<!-- comparison: begin -->\n", "<!-- comparison: end -->\n"
 
 
 def row_of(run: dict[str, Any], diagonal: float) -> Row:
@@ -36,7 +35,7 @@ def row_of(run: dict[str, Any], diagonal: float) -> Row:
             for title, key in (("mean", "mean"), ("max", "upper"))
         },
         "2r/R": f"{run['quality']['mean_ratio']:.3f}",
-        "χ": f"{run['euler_characteristic']:,}".replace("-", "\N{MINUS SIGN}"),
+        "χ": signed(run["euler_characteristic"]),
         "edges of other degree": f"{run['n_violating_edges']:,}",
         "double faces": f"{run['n_duplicate_faces']:,}",
         "crossing pairs": NONE if (n := run["n_self_intersections"]) is None else f"{n:,}",
@@ -71,10 +70,7 @@ def main() -> None:
     arguments = parser.parse_args()
     found = [json.loads((path / "results.json").read_text("utf-8")) for path in arguments.reports]
     tables = "\n\n".join(table.strip() for results in found for table in tables_of(results))
-    page = PAGE.read_text(encoding="utf-8")
-    before, rest = page.split(BEGIN)
-    after = rest.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n{tables}\n\n{END}{after}", encoding="utf-8")
+    write_between(PAGE, "comparison", tables)
 
 
 if __name__ == "__main__":

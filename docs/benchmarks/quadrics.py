@@ -21,28 +21,31 @@ import argparse
 import json
 import statistics
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common import (
-    CLOCKS,
     NAME,
     TOOLS,
-    WIDTH,
+    Outcome,
     Row,
     Seconds,
     Times,
     Tool,
-    as_markdown,
-    as_rich,
+    add_options,
+    as_result,
     gyroid,
+    installed,
     machine,
     one_core,
     seconds_of,
-    spread,
+    signed,
+    tell,
+    time_columns,
     timed,
+    wanted_tools,
 )
 from rich.console import Console
 
@@ -102,12 +105,9 @@ def load(name: str, arguments: argparse.Namespace) -> Case:
 
 
 @dataclass
-class Measured:
+class Measured(Outcome):
     """What one tool did in one case. Distances are in diagonals of the box around the input."""
 
-    tool: str
-    times: list[Times] = field(default_factory=list)
-    n_faces: int = 0
     mean_to_input: float = 0.0
     mean_from_input: float = 0.0
     mean: float = 0.0
@@ -117,12 +117,7 @@ class Measured:
     radius_ratio: float = 0.0
     slivers: int = 0
     needles: int = 0
-    edges_of_degree_above_2: int = 0
-    duplicate_faces: int = 0
-    degenerate_faces: int = 0
     flipped_faces: int = 0
-    euler_characteristic: int = 0
-    same_topology: bool = False
     error: str | None = None
     """Why there are no figures."""
 
@@ -151,12 +146,7 @@ def run(
 
 def look_at(measured: Measured, case: Case, target: Target, result: Mesh) -> None:
     """Measure the topology of a mesh and its faces."""
-    found = tetsimplify.topology(*result)
-    measured.n_faces = found.n_faces
-    measured.euler_characteristic = found.euler_characteristic
-    measured.edges_of_degree_above_2 = len(found.non_manifold_edges)
-    measured.duplicate_faces = len(found.duplicate_faces)
-    measured.same_topology = found.same_topology(tetsimplify.topology(*case.mesh))
+    measured.look_at(result, case.mesh)
     shape = tetsimplify.quality(*result)
     measured.degenerate_faces = len(shape.zero_area_faces)
     measured.radius_ratio = float(shape.radius_ratio.mean())
@@ -167,7 +157,7 @@ def look_at(measured: Measured, case: Case, target: Target, result: Mesh) -> Non
 
 def judge(measured: Measured, case: Case, target: Target, vertices: Any, faces: Any) -> None:
     """Measure a result."""
-    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
+    result = as_result(vertices, faces)
     look_at(measured, case, target, result)
     unit = case.diagonal
     distance = tetsimplify.surface_distance(result, case.mesh, tolerance=TOLERANCE * unit)
@@ -226,12 +216,10 @@ def comparison_rows(tools: list[dict[str, Any]], given: dict[str, Any], clock: s
 
     def row(tool: dict[str, Any]) -> Row:
         seconds: Seconds = seconds_of(tool["times"], clock)
-        took = median_seconds(tool, clock) / median_seconds(ours, clock) if seconds else 0.0
         return {
-            "tool": tool["tool"],
-            "seconds, median (min to max)": spread(seconds) if seconds else "",
-            "ratio": f"{took:.2f}" if seconds else "",
-            "faces": f"{tool['n_faces']:,}",
+            **time_columns(
+                tool["tool"], seconds, seconds_of(ours["times"], clock), tool["n_faces"]
+            ),
             "mean": number(tool["mean"] / UNIT) if seconds else "",
             "to ours": number(tool["mean"] / ours["mean"]) if seconds else "",
             "max": number(tool["max_upper"] / UNIT) if seconds else "",
@@ -280,7 +268,7 @@ def tables_of(figures: dict[str, Any]) -> list[tuple[str, list[Row]]]:
     """All tables, with their titles."""
     tables = []
     for title, case in figures["cases"].items():
-        chi = f"{case['euler_characteristic']:,}".replace("-", "\N{MINUS SIGN}")
+        chi = signed(case["euler_characteristic"])
         mended = "" if case["repaired"] is None else ", repaired first"
         heading = f"{title}: {case['n_faces']:,} faces, χ = {chi}{mended}"
         tables.append((heading, comparison_rows(case["tools"], case["input"], figures["clock"])))
@@ -301,15 +289,11 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--keep", type=float, nargs="*", default=[15.0, 2.0], help="per cent of the faces to keep"
     )
-    parser.add_argument("--repeats", type=int, default=5, help="runs of every tool in every case")
     parser.add_argument(
         "--patience", type=float, default=np.inf, help="tools slower than so many seconds run once"
     )
-    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
-    parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
-    parser.add_argument("--json", type=Path, help="file to add all figures to")
     parser.add_argument("--tables", action="store_true", help="tables of that file, no new figures")
-    parser.add_argument("--markdown", type=Path, help="file to write the tables to")
+    add_options(parser)
     return parser.parse_args()
 
 
@@ -317,19 +301,14 @@ def main() -> None:
     """Measure and tell."""
     arguments = parse()
     console = Console(stderr=True)
-    wanted = [
-        tool
-        for tool in PEERS
-        if arguments.tools is None or any(part in tool.name for part in arguments.tools)
-    ]
-    tools = [tool for tool in wanted if tool.is_installed]
+    tools, absent = installed(wanted_tools(arguments, PEERS))
     figures: dict[str, Any] = {"cases": {}}
     if arguments.json and arguments.json.exists():
         figures = json.loads(arguments.json.read_text())
     if not arguments.tables:
         figures["clock"] = arguments.clock
         figures["machine"] = machine()
-        figures["absent"] = [tool.name for tool in wanted if not tool.is_installed]
+        figures["absent"] = absent
     for name in () if arguments.tables else arguments.cases:
         case = load(name, arguments)
         before = tetsimplify.topology(*case.mesh)
@@ -349,17 +328,7 @@ def main() -> None:
             if arguments.json:
                 arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
 
-    tables = tables_of(figures)
-    out = Console()
-    out.width = max(out.width, WIDTH)
-    for title, rows in tables:
-        out.print(as_rich(title, rows))
-    if figures["absent"]:
-        out.print(f"not installed: {', '.join(figures['absent'])}")
-    out.print(figures["machine"])
-    if arguments.markdown:
-        text = "\n".join(as_markdown(title, rows) for title, rows in tables)
-        arguments.markdown.write_text(text, encoding="utf-8")
+    tell(tables_of(figures), figures, arguments.markdown)
 
 
 if __name__ == "__main__":

@@ -18,34 +18,37 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common import (
-    CLOCKS,
     NAME,
     TOOLS,
-    WIDTH,
+    Outcome,
     Row,
     Seconds,
     Times,
     Tool,
-    as_markdown,
-    as_rich,
+    add_options,
+    as_result,
     gyroid,
+    installed,
     machine,
     one_core,
     seconds_of,
+    signed,
     spread,
+    tell,
+    time_columns,
     timed,
+    wanted_tools,
 )
 from rich.console import Console
 
@@ -105,31 +108,17 @@ def load(case: str, arguments: argparse.Namespace) -> Case:
 
 
 @dataclass
-class Measured:
+class Measured(Outcome):
     """What one tool did in one case."""
 
-    tool: str
-    times: list[Times] = field(default_factory=list)
-    n_faces: int = 0
-    euler_characteristic: int = 0
-    edges_of_degree_above_2: int = 0
-    duplicate_faces: int = 0
-    degenerate_faces: int = 0
-    same_topology: bool = False
     short_edges: int = 0
     remaining: dict[str, int] | None = None
 
 
 def judge(measured: Measured, case: Case, vertices: Any, faces: Any) -> None:
     """Look at the topology of a result, and at the short edges left."""
-    result = Mesh(np.asarray(vertices, np.float64), np.asarray(faces).astype(np.int32))
-    found = tetsimplify.topology(*result)
-    measured.n_faces = found.n_faces
-    measured.euler_characteristic = found.euler_characteristic
-    measured.edges_of_degree_above_2 = len(found.non_manifold_edges)
-    measured.duplicate_faces = len(found.duplicate_faces)
-    measured.degenerate_faces = len(found.degenerate_faces)
-    measured.same_topology = found.same_topology(tetsimplify.topology(*case.mesh))
+    result = as_result(vertices, faces)
+    measured.look_at(result, case.mesh)
     measured.short_edges = int((edge_lengths(result) < case.max_edge_length).sum())
 
 
@@ -173,11 +162,13 @@ print(time.perf_counter() - begin)
 CHILD_FIRST = """
 import time
 begin = time.perf_counter()
-import sys, numpy as np, tetsimplify
+import json, sys, numpy as np, tetsimplify
 vertices, faces = (np.load(path) for path in sys.argv[1:3])
-report = tetsimplify.simplify(vertices, faces, max_edge_length=0.8).report
+told = json.loads(sys.argv[3])
+report = tetsimplify.simplify(vertices, faces, **told).report
 seconds = time.perf_counter() - begin
-assert report.n_nested, "the kernels for nested contractions were not needed"
+if "max_edge_length" in told:
+    assert report.n_nested, "the kernels for nested contractions were not needed"
 print(seconds)
 """
 
@@ -212,16 +203,17 @@ def saved(mesh: Mesh) -> Iterator[list[str]]:
         yield paths
 
 
-def cold_starts(repeats: int) -> dict[str, Seconds]:
+def cold_starts(repeats: int, **criterion: float) -> dict[str, Seconds]:
     """Seconds in fresh processes: import, and the first call with an empty and a full cache."""
+    told = json.dumps(criterion or {"max_edge_length": 0.8})
     child(CHILD_IMPORT)  # so that all files are in memory
     measured: dict[str, Seconds] = {"import": [child(CHILD_IMPORT) for _ in range(repeats)]}
     empty: Seconds = []
     with saved(gyroid(40_000)) as paths:
         for _ in range(max(1, repeats // 2)):
             with tempfile.TemporaryDirectory() as cache:
-                empty.append(child(CHILD_FIRST, *paths, cache=cache))
-                full = [child(CHILD_FIRST, *paths, cache=cache) for _ in range(repeats)]
+                empty.append(child(CHILD_FIRST, *paths, told, cache=cache))
+                full = [child(CHILD_FIRST, *paths, told, cache=cache) for _ in range(repeats)]
     return (
         measured
         | {"import and first call, full cache": full}
@@ -247,14 +239,10 @@ def peak_memory(case: Case) -> float | None:
 def comparison_rows(measured: list[Measured], clock: str) -> list[Row]:
     """The table of one case."""
     seconds = {row.tool: seconds_of(row.times, clock) for row in measured}
-    reference = statistics.median(seconds[NAME])
     return [
         {
-            "tool": row.tool,
-            "seconds, median (min to max)": spread(seconds[row.tool]),
-            "ratio": f"{statistics.median(seconds[row.tool]) / reference:.2f}",
-            "faces": f"{row.n_faces:,}",
-            "χ": f"{row.euler_characteristic:,}".replace("-", "\N{MINUS SIGN}"),
+            **time_columns(row.tool, seconds[row.tool], seconds[NAME], row.n_faces),
+            "χ": signed(row.euler_characteristic),
             "edges of degree > 2": f"{row.edges_of_degree_above_2:,}",
             "duplicate faces": f"{row.duplicate_faces:,}",
             "degenerate faces": f"{row.degenerate_faces:,}",
@@ -273,12 +261,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument("cases", nargs="*", default=["gyroid", "brain"], metavar="CASE")
     parser.add_argument("--faces", type=int, default=2_000_000, help="faces of the gyroid")
     parser.add_argument("--keep", type=float, default=15.0, help="per cent of the faces to keep")
-    parser.add_argument("--repeats", type=int, default=5, help="runs of every tool in every case")
-    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="whose time to tell")
-    parser.add_argument("--tools", nargs="*", help="only these tools, by parts of their names")
     parser.add_argument("--no-cold", action="store_true", help="leave the fresh processes out")
-    parser.add_argument("--json", type=Path, help="file to write all figures to")
-    parser.add_argument("--markdown", type=Path, help="file to write the tables to")
+    add_options(parser)
     return parser.parse_args()
 
 
@@ -286,16 +270,11 @@ def main() -> None:
     """Measure and tell."""
     arguments = parse()
     console = Console(stderr=True)
-    wanted = [
-        tool
-        for tool in TOOLS
-        if arguments.tools is None or any(part in tool.name for part in arguments.tools)
-    ]
-    tools = [tool for tool in wanted if tool.is_installed]
+    tools, absent = installed(wanted_tools(arguments, TOOLS))
     figures: dict[str, Any] = {
         "machine": machine(),
         "clock": arguments.clock,
-        "absent": [tool.name for tool in wanted if not tool.is_installed],
+        "absent": absent,
         "cases": {},
     }
     tables: list[tuple[str, list[Row]]] = []
@@ -317,7 +296,7 @@ def main() -> None:
             "topology": topology_times,
             "peak_bytes_a_face": memory,
         }
-        chi = f"{before.euler_characteristic:,}".replace("-", "\N{MINUS SIGN}")
+        chi = signed(before.euler_characteristic)
         title = f"{case.name}: {before.n_faces:,} faces, χ = {chi}"
         tables.append((title, comparison_rows(measured, arguments.clock)))
         own.append(
@@ -342,18 +321,9 @@ def main() -> None:
             )
         )
 
-    out = Console()
-    out.width = max(out.width, WIDTH)
-    for title, rows in tables:
-        out.print(as_rich(title, rows))
-    if figures["absent"]:
-        out.print(f"not installed: {', '.join(figures['absent'])}")
-    out.print(figures["machine"])
+    tell(tables, figures, arguments.markdown)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
-    if arguments.markdown:
-        text = "\n".join(as_markdown(title, rows) for title, rows in tables)
-        arguments.markdown.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

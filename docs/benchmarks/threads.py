@@ -1,6 +1,6 @@
-"""One thread and two, in turn with two of the peers: extraction, by length, by quadric error.
+"""One thread and two, in turn: extraction, topology, distance. Simplification is in peers.py.
 
-python docs/benchmarks/threads.py --faces 2000000 --repeats 5
+python docs/benchmarks/threads.py --samples 256 --faces 2000000 --repeats 5
 """
 
 from __future__ import annotations
@@ -12,14 +12,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from common import TOOLS, Row, as_markdown, gyroid
-from simplify import length_that_keeps
+from common import Row, as_markdown, gyroid
 
 import tetsimplify
 
 KEPT = 0.15  # of the faces
 THREADS = (1, 2)
-PEERS = ("meshoptimizer", "fast-simplification")
 
 
 def in_turn(works: dict[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
@@ -32,40 +30,6 @@ def in_turn(works: dict[str, Callable[[], Any]], repeats: int) -> dict[str, floa
             if i:
                 seconds[name].append(time.perf_counter() - begin)
     return {name: statistics.median(some) for name, some in seconds.items()}
-
-
-def simplifications(n_faces: int, repeats: int) -> list[Row]:
-    """Contraction by length and by quadric error, and the peers, to the same number of faces."""
-    mesh = gyroid(n_faces)
-    length = length_that_keeps(mesh, KEPT)
-    target = round(KEPT * len(mesh.faces))
-    works: dict[str, Callable[[], Any]] = {}
-    for n in THREADS:
-        works[f"by length, {n}"] = lambda n=n: tetsimplify.simplify(
-            *mesh, max_edge_length=length, threads=n
-        )
-        works[f"by error, {n}"] = lambda n=n: tetsimplify.simplify(
-            *mesh, target_faces=target, threads=n
-        )
-    for tool in TOOLS:
-        if tool.name in PEERS:
-            works[tool.name] = lambda tool=tool: tool.run(tool.prepare(mesh), target)
-    seconds = in_turn(works, repeats)
-    rows = []
-    for mode in ("by length", "by error"):
-        one, two = (seconds[f"{mode}, {n}"] for n in THREADS)
-        row = {
-            f"{len(mesh.faces):,} faces": mode,
-            "1 thread, s": f"{one:.2f}",
-            "2, s": f"{two:.2f}",
-            "1 / 2": f"{one / two:.2f}",
-        }
-        for peer in PEERS:
-            if peer in seconds:
-                row[f"{peer}, s"] = f"{seconds[peer]:.2f}"
-                row[f"{peer} / 2 threads"] = f"{seconds[peer] / two:.2f}"
-        rows.append(row)
-    return rows
 
 
 def extractions(n: int, repeats: int) -> list[Row]:
@@ -91,6 +55,25 @@ def extractions(n: int, repeats: int) -> list[Row]:
     ]
 
 
+def measures(n_faces: int, repeats: int) -> list[Row]:
+    """The topology of a gyroid, and its distance to what is left of it."""
+    mesh = gyroid(n_faces)
+    result = tetsimplify.simplify(*mesh, keep_ratio=KEPT)
+    works: dict[str, Callable[[], Any]] = {}
+    for n in THREADS:
+        works[f"topology, {n}"] = lambda n=n: tetsimplify.topology(*mesh, threads=n)
+        works[f"surface_distance, {n}"] = lambda n=n: tetsimplify.surface_distance(
+            mesh, result[:2], threads=n
+        )
+    seconds = in_turn(works, repeats)
+    rows = []
+    for verb in ("topology", "surface_distance"):
+        one, two = (seconds[f"{verb}, {n}"] for n in THREADS)
+        row = {"": verb, "1 thread, s": f"{one:.3g}", "2, s": f"{two:.3g}"}
+        rows.append(row | {"1 / 2": f"{one / two:.2f}"})
+    return rows
+
+
 def main() -> None:
     """Measure, and print tables."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -98,8 +81,8 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=256)
     parser.add_argument("--repeats", type=int, default=5)
     arguments = parser.parse_args()
-    rows = simplifications(arguments.faces, arguments.repeats)
-    print(as_markdown(f"gyroid, cut to {KEPT:.0%}", rows))
+    title = f"gyroid of about {arguments.faces:,} faces, and the same cut to {KEPT:.0%}"
+    print(as_markdown(title, measures(arguments.faces, arguments.repeats)))
     print(as_markdown("gyroid, extracted", extractions(arguments.samples, arguments.repeats)))
 
 

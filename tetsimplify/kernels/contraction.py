@@ -51,20 +51,18 @@ from tetsimplify.kernels.watch import follow, star_crosses
 def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 
-    NESTED when it does not, OUTSIDE when a face at it is in another block; with ``blocked="violate"`` it does not matter.
+    NESTED when it does not; with ``blocked="violate"`` it does not matter. OUTSIDE when a face at
+    one of its ends is in another block.
     """
     v = surface.corner_vertex[corner]
     u = surface.corner_vertex[ahead(corner)]
-    if (
-        surface.vertex_block[v] != scratch.tally[BLOCK]
-        or surface.vertex_block[u] != scratch.tally[BLOCK]
-    ):
+    block = scratch.tally[BLOCK]
+    if surface.vertex_block[v] != block or surface.vertex_block[u] != block:
         return OUTSIDE
     if surface.locked[v] and surface.locked[u]:
         return LOCKED
     n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)
     if rules.blocked != VIOLATE:
-        block = scratch.tally[BLOCK]
         allowed = link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common)
         if allowed != CONTRACTIBLE:
             return allowed
@@ -79,7 +77,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     if placed != CONTRACTIBLE:
         return placed
     loop = max(surface.loop[v], surface.loop[u])
-    if n_doomed == 1 and loop >= 0 and surface.loop_home[loop] == scratch.tally[BLOCK]:
+    if n_doomed == 1 and loop >= 0 and surface.loop_home[loop] == block:
         surface.loop_size[loop] -= 1
     _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
     if watch is not None:

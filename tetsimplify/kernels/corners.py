@@ -33,28 +33,16 @@ def behind(corner):
 
 @part
 def others(corner_vertex, corner):
-    """The vertices of the corners ahead and behind, in half the time of asking for each."""
-    k = np.uint32(corner) % np.uint32(3)  # a product and a shift; signed numbers take more
-    first = corner - k
-    a = corner_vertex[first + (k == 0) + 2 * (k == 1)]
-    return a, corner_vertex[first + 2 * (k == 0) + (k == 2)]
+    """The vertices of the corners ahead and behind.
 
-
-@part
-def vertex_ahead(corner_vertex, corner):
-    """The vertex of the corner that follows in the same face.
-
-    Unsigned, as it spares the machine the question whether an index counts from the end.
+    Unsigned numbers are divided by a product and a shift, and nobody asks whether they count from
+    the end of an array: half the time of asking for one after the other.
     """
     c = np.uint32(corner)
-    return corner_vertex[c - np.uint32(2) if c % np.uint32(3) == 2 else c + np.uint32(1)]
-
-
-@part
-def vertex_behind(corner_vertex, corner):
-    """The vertex of the corner that precedes in the same face."""
-    c = np.uint32(corner)
-    return corner_vertex[c + np.uint32(2) if c % np.uint32(3) == 0 else c - np.uint32(1)]
+    k = c % np.uint32(3)
+    following = c - np.uint32(2) if k == 2 else c + np.uint32(1)
+    preceding = c + np.uint32(2) if k == 0 else c - np.uint32(1)
+    return corner_vertex[following], corner_vertex[preceding]
 
 
 @part

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetsimplify.kernels.corners import vertex_ahead, vertex_behind
+from tetsimplify.kernels.corners import others
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.quadrics import AREA, NORMAL
 from tetsimplify.kernels.state import (
@@ -32,8 +32,8 @@ def turns_over(vertices, corner_vertex, star, n_v, n_u, v, u, point, cos_foldove
     ux, uy, uz = vertices[u, 0] - px, vertices[u, 1] - py, vertices[u, 2] - pz
     for i in range(n_v + n_u):
         ox, oy, oz = (vx, vy, vz) if i < n_v else (ux, uy, uz)
-        a = np.uint32(vertex_ahead(corner_vertex, star[i]))
-        b = np.uint32(vertex_behind(corner_vertex, star[i]))
+        a, b = others(corner_vertex, star[i])
+        a, b = np.uint32(a), np.uint32(b)
         ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
         bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
         new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -83,8 +83,8 @@ def harm(surface, quadrics, scratch, rules, v, u, n_v, n_u):
     star = scratch.lists[STAR]
     for i in range(n_v + n_u):
         ox, oy, oz = (vx, vy, vz) if i < n_v else (ux, uy, uz)
-        a = np.uint32(vertex_ahead(corner_vertex, star[i]))
-        b = np.uint32(vertex_behind(corner_vertex, star[i]))
+        a, b = others(corner_vertex, star[i])
+        a, b = np.uint32(a), np.uint32(b)
         ax, ay, az = vertices[a, 0] - px, vertices[a, 1] - py, vertices[a, 2] - pz
         bx, by, bz = vertices[b, 0] - px, vertices[b, 1] - py, vertices[b, 2] - pz
         new_x, new_y, new_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 
 def _digest_of_kernels() -> str:
@@ -74,17 +75,26 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
     except RuntimeError as error:  # no folder that the cache could be written to
         warnings.warn(f"kernels are compiled anew in every process: {error}", stacklevel=3)
         return numba.njit(nogil=True, **options)(function)
-    _name_by_digest(compiled._cache._cache_file)
+    numbered = compiled._cache._cache_file
+    name = f"{numbered._index_name.removesuffix('.nbi')}.{KERNELS_DIGEST[:16]}"
+    compiled._cache._cache_file = CacheFile(numbered._cache_path, name, KERNELS_DIGEST)
     return compiled
 
 
-def _name_by_digest(cache: Any) -> None:
-    """Give the files of each state of the kernels names of their own.
+class CacheFile(IndexDataCacheFile):
+    """The files of one kernel in the cache.
 
-    Those of another state could not even be read where a NamedTuple has changed.
+    Each state of the kernels has files with names of their own: those of another state could not
+    even be read where a NamedTuple has changed. And machine code has a name by the types that it is
+    for, where Numba takes the next number that is free: two processes that compile for different
+    types at the same time take the same one, and each may then find the code of the other.
     """
-    name = f"{cache._index_name.removesuffix('.nbi')}.{KERNELS_DIGEST[:16]}"
-    cache._source_stamp = KERNELS_DIGEST
-    cache._index_name = f"{name}.nbi"
-    cache._index_path = str(Path(cache._cache_path) / cache._index_name)
-    cache._data_name_pattern = f"{name}.{{number:d}}.nbc"
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save what was compiled for some types."""
+        overloads = self._load_index()
+        if key not in overloads:
+            kind = hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+            overloads[key] = f"{self._index_name.removesuffix('.nbi')}.{kind}.nbc"
+            self._save_index(overloads)
+        self._save_data(overloads[key], data)

@@ -13,7 +13,7 @@ tetrahedron, or with the cone in a single triangle):
 
 import numpy as np
 
-from tetsimplify.kernels.corners import DEAD, ahead, face_of, vertex_ahead, vertex_behind
+from tetsimplify.kernels.corners import DEAD, ahead, face_of, others
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
@@ -23,8 +23,6 @@ from tetsimplify.kernels.state import (
     STAMP,
     STAR,
 )
-
-GONE = np.uint32(2**32 + DEAD)  # the same, unsigned
 
 
 @part
@@ -43,8 +41,8 @@ def gather_stars(surface, scratch, corner):
     """
     corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
     star, doomed = scratch.lists[STAR], scratch.lists[DOOMED]
-    v = np.uint32(corner_vertex[corner])
-    u = np.uint32(corner_vertex[ahead(corner)])
+    v = corner_vertex[corner]
+    u = corner_vertex[ahead(corner)]
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
 
@@ -52,11 +50,10 @@ def gather_stars(surface, scratch, corner):
     n_doomed = 0
     c = corner
     while True:
-        n = np.uint32(vertex_ahead(corner_vertex, c))
-        p = np.uint32(vertex_behind(corner_vertex, c))
-        if n != GONE:
-            mark[n] = stamp
-            mark[p] = stamp
+        n, p = others(corner_vertex, c)
+        if n != DEAD:
+            mark[np.uint32(n)] = stamp
+            mark[np.uint32(p)] = stamp
             is_doomed = (n == u) | (p == u)
             doomed[n_doomed] = face_of(c)
             n_doomed += is_doomed
@@ -71,14 +68,13 @@ def gather_stars(surface, scratch, corner):
     start = ahead(corner)
     c = start
     while True:
-        n = np.uint32(vertex_ahead(corner_vertex, c))
-        p = np.uint32(vertex_behind(corner_vertex, c))
-        if n != GONE:
-            is_common = mark[n] == stamp
-            mark[n] -= is_common
+        n, p = others(corner_vertex, c)
+        if n != DEAD:
+            is_common = mark[np.uint32(n)] == stamp
+            mark[np.uint32(n)] -= is_common
             n_common += is_common
-            is_common = mark[p] == stamp
-            mark[p] -= is_common
+            is_common = mark[np.uint32(p)] == stamp
+            mark[np.uint32(p)] -= is_common
             n_common += is_common
             star[n_v + n_u] = c
             n_u += (n != v) & (p != v)

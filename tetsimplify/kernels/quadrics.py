@@ -7,8 +7,8 @@ place y, relative to the vertex itself, it is
 
 with the normal n and the weight w of each plane: its area, in units of about the mean area of the
 faces given, so that single precision is enough for meshes of any size. Relative to the vertex: so a
-mesh far from the origin loses nothing, and a quadric that is new has b = 0 and c = 0. The trace of A
-is the sum of the areas, so Q / trace(A) is a mean squared distance.
+mesh far from the origin loses nothing, and a quadric that is new has b = 0 and c = 0. The trace of
+A is the sum of the areas, so Q / trace(A) is a mean squared distance.
 
 On a plane the sum cancels to nothing, which only comes out when A is kept in double precision. b
 and c are small there, and single precision is enough for them.
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead, behind, vertex_ahead, vertex_behind
+from tetsimplify.kernels.corners import ahead, behind, others
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
@@ -215,7 +215,7 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
         sum_x = sum_y = sum_z = sum_area = 0.0
         c = first_corner[v]
         while True:
-            a, b = vertex_ahead(corner_vertex, c), vertex_behind(corner_vertex, c)
+            a, b = others(corner_vertex, c)
             x, y, z = _area_vector(vertices, v, np.uint32(a), np.uint32(b))
             area = np.sqrt(x * x + y * y + z * z)
             scale = 1.0 / area if area > 0.0 else 0.0

@@ -159,8 +159,9 @@ def sweep_ranked(
 ):
     """Sweep over blocks with a threshold that grows: at most one edge of each face in each sweep.
 
-    The costs of a face are brought up to date when a sweep comes to it, unless it is frozen. An edge that is refused waits for a higher threshold: for what it costs at the place where it
-    can be contracted, or for RAISE times the present one.
+    The costs of a face are brought up to date when a sweep comes to it, unless it is frozen. An
+    edge that is refused waits for a higher threshold: for what it costs at the place where it can
+    be contracted, or for RAISE times the present one.
 
     Parameters
     ----------
