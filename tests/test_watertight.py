@@ -1,7 +1,7 @@
 """Isosurfaces of ten thousand small volumes by each lattice: watertight, all of them.
 
-`test_isosurface.py` compares with a slow oracle one by one. Here the same is asked of very many: the
-surfaces of a hundred volumes are laid beside each other as one mesh, and each property is one
+`test_isosurface.py` compares with a slow oracle one by one. Here the same is asked of very many:
+the surfaces of a hundred volumes are laid beside each other as one mesh, and each property is one
 operation on arrays, which shares nothing with the package.
 """
 
@@ -14,9 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 import models
+from test_isosurface import random_volume
 from tetsimplify import Mesh, extract_isosurface
 from tetsimplify.lattices import LATTICES
-from test_isosurface import random_volume
 
 sparse = pytest.importorskip("scipy.sparse")
 pytest.importorskip("scipy.sparse.csgraph")
