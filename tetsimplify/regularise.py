@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 from tetsimplify import kernels
 from tetsimplify.errors import OptionError
 from tetsimplify.march import March
+from tetsimplify.mesh import NORMALS
 from tetsimplify.tables import Tables
-from tetsimplify.vertex_data import NORMALS
 
 Indices = NDArray[np.int32]
 
