@@ -142,12 +142,12 @@ def rows_of(path: str, level: float, n: int) -> list[Row]:
         if mesh is not cubes:
             to, fro = measured(mesh, n, cubes, SPLIT)
             row |= {
-                "scikit-image: largest": f"{to.largest:.2f}, {fro.largest:.2f}",
-                "its places": f"{to.places}, {fro.places}",
-                "its share": f"{100 * max(to.share, fro.share):.3f} %",
+                "against scikit-image: largest": f"{to.largest:.2f}, {fro.largest:.2f}",
+                "places there": f"{to.places}, {fro.places}",
+                "area there": f"{100 * max(to.share, fro.share):.3f} %",
             }
         else:
-            row |= {"scikit-image: largest": "", "its places": "", "its share": ""}
+            row |= {"against scikit-image: largest": "", "places there": "", "area there": ""}
         rows.append(row)
     return rows
 
