@@ -146,7 +146,8 @@ def isosurface_to_new_mesh(ms: pymeshlab.MeshSet, **parameters: Any) -> dict[str
         The level of the surface.
     spacing, origin : ndarray, shape (3,)
     lattice, normals : str
-    closed : bool
+    closed, regularise : bool
+    refine : int
         See :func:`tetsimplify.extract_isosurface`.
     meshname : str
         Label of the new mesh.
@@ -313,6 +314,8 @@ FILTERS = {
             "lattice": Parameter(str, "kuhn", "lattice", choices=tuple(LATTICES)),
             "closed": Parameter(bool, False, "closed"),
             "normals": Parameter(str, "lower", "normals", choices=("lower", "higher")),
+            "refine": Parameter(int, 1, "refine"),
+            "regularise": Parameter(bool, False, "regularise"),
             "meshname": Parameter(str, "Isosurface", "label"),
         },
     ),

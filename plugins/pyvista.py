@@ -13,7 +13,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from tetsimplify import seams
 from tetsimplify.adapters import Adapter, MeshArrays, needs
 from tetsimplify.errors import MeshError, VolumeError
-from tetsimplify.isosurface import extract_isosurface
+from tetsimplify.io import Volume, isosurface_of
+from tetsimplify.mesh import NORMALS
 from tetsimplify.topology import TopologyReport
 from tetsimplify.topology import topology as topology_of_arrays
 
@@ -95,7 +96,7 @@ def topology(mesh: pyvista.PolyData) -> TopologyReport:
 
 def isosurface(
     image: pyvista.ImageData,
-    level: float | Iterable[float],
+    level: float | str | Iterable[float | str] | None = None,
     scalars: str | None = None,
     **options: Any,
 ) -> pyvista.PolyData:
@@ -104,19 +105,22 @@ def isosurface(
     Parameters
     ----------
     image : pyvista.ImageData or vtkImageData
-    level : float or iterable of floats
-        The iso-value; with several all surfaces are in one mesh, as `contour` does it.
+    level : float, "otsu", or iterable of these
+        The iso-value; with several all surfaces are in one mesh, as `contour` does it. Not given
+        where the options have `labels`, whose surfaces are in one mesh likewise.
     scalars : str, optional
         The point array; by default the active scalars.
     **options
-        Those of :func:`tetsimplify.extract_isosurface`: `lattice`, `closed`, `normals`,
-        `progress`.
+        Those of :func:`tetsimplify.extract_isosurface`: `labels`, `lattice`, `closed`, `normals`,
+        `refine`, `regularise`, `vertex_normals`, `progress`. As `vertex_data` also a list of the
+        names of other point arrays.
 
     Returns
     -------
     pyvista.PolyData
         In the coordinates of `image` (spacing, origin, extent and direction). The point array
-        of the name of the scalars holds the level of each point.
+        of the name of the scalars holds the level or the label of each point; others hold what
+        was asked for, the normals as active normals.
 
     Raises
     ------
@@ -136,24 +140,45 @@ def isosurface(
         if source.cell_data:
             hint = "image.cell_data_to_point_data() makes point data of cell data"
         raise VolumeError(f"the image has no point array {name!r}: {hint}")
-    values = source.point_data[name]
+    samples = _samples(source, name)
+    affine = np.array(source.index_to_physical_matrix)
+    affine[:3, 3] += affine[:3, :3] @ source.extent[::2]
+    fields = options.pop("vertex_data", None) or {}
+    if not isinstance(fields, Mapping):
+        fields = {field: _samples(source, field) for field in fields}
+    several = level if isinstance(level, str) or not isinstance(level, Iterable) else list(level)
+    found = isosurface_of(Volume(samples, affine), several, vertex_data=fields, **options)
+    surfaces = found if isinstance(found, list) else [found]
+
+    first = np.cumsum([0] + [len(surface.vertices) for surface in surfaces])
+    points = [np.empty((0, 3)), *(surface.vertices for surface in surfaces)]
+    faces = [surface.faces + np.int32(n) for surface, n in zip(surfaces, first[:-1], strict=True)]
+    data: Data = {}
+    for field in getattr(surfaces[0], "vertex_data", {}) if surfaces else {}:
+        data[field] = np.concatenate([surface.vertex_data[field] for surface in surfaces])
+    if surfaces and hasattr(surfaces[0], "label"):
+        shown = np.array([surface.label for surface in surfaces])
+    else:
+        shown = np.array([surface.level for surface in surfaces], float)
+    normals = data.pop(NORMALS, None)
+    data[name] = np.repeat(shown, np.diff(first))
+    made = to_pyvista(
+        np.concatenate(points), np.concatenate([np.empty((0, 3), np.int32), *faces]), data
+    )
+    if normals is not None:
+        made.point_data.active_normals = normals
+    made.set_active_scalars(name)
+    return made
+
+
+def _samples(image: pyvista.ImageData, name: str) -> NDArray[Any]:
+    """A point array as a volume, x first; nothing is copied."""
+    if name not in image.point_data:
+        raise VolumeError(f"the image has no point array {name!r}, only {image.point_data.keys()}")
+    values = np.asarray(image.point_data[name])
     if values.ndim != 1:
         raise VolumeError(f"scalars must have one component, {name!r} has shape {values.shape}")
-    samples = values.reshape(source.dimensions[::-1])  # x runs fastest
-    to_world = np.asarray(source.index_to_physical_matrix)
-    corner = np.array(source.extent[::2])
-    levels = list(level) if isinstance(level, Iterable) else [level]
-
-    points, faces, shown = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [np.empty(0)]
-    for value in levels:
-        surface = extract_isosurface(samples, float(value), **options)
-        faces.append(surface.faces + np.int32(sum(map(len, points))))
-        points.append((surface.vertices[:, ::-1] + corner) @ to_world[:3, :3].T + to_world[:3, 3])
-        shown.append(np.full(len(surface.vertices), float(value)))
-    triangles = np.concatenate(faces)
-    if np.linalg.det(to_world[:3, :3]) > 0:  # from z, y, x to x, y, z is a reflection
-        triangles = triangles[:, ::-1]
-    return to_pyvista(np.concatenate(points), triangles, {name: np.concatenate(shown)})
+    return values.reshape(image.dimensions[::-1]).T  # x runs fastest
 
 
 def from_pyvista(mesh: pyvista.PolyData) -> MeshArrays:
@@ -285,7 +310,10 @@ class ImageAccessor:
         self._image = image
 
     def isosurface(
-        self, level: float | Iterable[float], scalars: str | None = None, **options: Any
+        self,
+        level: float | str | Iterable[float | str] | None = None,
+        scalars: str | None = None,
+        **options: Any,
     ) -> pyvista.PolyData:
         """Extract surfaces; see :func:`tetsimplify.plugins.pyvista.isosurface`."""
         return isosurface(self._image, level, scalars, **options)

@@ -147,8 +147,11 @@ def test_wrong_inputs_are_refused(sources, options, error, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "either keep_ratio or max_edge_length"),
-        ({"keep_ratio": 0.5, "max_edge_length": 1.0}, "either keep_ratio or max_edge_length"),
+        ({}, "either keep_ratio or max_edge_length or regularised"),
+        (
+            {"keep_ratio": 0.5, "max_edge_length": 1.0},
+            "either keep_ratio or max_edge_length or regularised",
+        ),
         ({"keep_ratio": [0.5, 2.0]}, "keep_ratio must be above 0 and at most 1, got 2"),
         ({"keep_ratio": []}, "at least one"),
         ({"max_edge_length": "wide"}, "a percentage of the median edge"),
@@ -494,7 +497,7 @@ def test_command_lists_methods():
     ("arguments", "message"),
     [
         ([], "give at least one input"),
-        (["torus:1500"], "either keep_ratio or max_edge_length"),
+        (["torus:1500"], "either keep_ratio or max_edge_length or regularised"),
         (["torus:1500", "--keep-ratio", "a lot"], "--keep-ratio must be"),
         (["torus:1500", "--max-edge-length", "1,x"], "--max-edge-length must be"),
         (["torus:1500", "--keep-ratio", "0.5", "--methods", "x"], "there is no method x"),

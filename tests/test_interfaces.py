@@ -173,3 +173,67 @@ def test_the_frog():
         report = topology(*found.surface(label))
         assert report.is_manifold
         assert report.is_closed
+
+
+# ---------------------------------------------------------------------------- surfaces by label
+
+
+def test_labels_of_an_isosurface_are_surfaces_of_interfaces():
+    volume = np.random.default_rng(7).integers(0, 4, (6, 7, 5))
+    found = extract_interfaces(volume, spacing=(1, 2, 3), origin=(4, 5, 6))
+    options = {"closed": True, "spacing": (1, 2, 3), "origin": (4, 5, 6)}
+    surfaces = extract_isosurface(volume, labels="all", **options)
+    assert [surface.label for surface in surfaces] == [1, 2, 3]
+    for surface in surfaces:
+        vertices, faces = surface
+        np.testing.assert_array_equal(vertices, found.surface(surface.label).vertices)
+        np.testing.assert_array_equal(faces, found.surface(surface.label).faces)
+        assert topology(*surface).is_closed
+    inward = extract_isosurface(volume, labels="all", normals="higher", **options)
+    np.testing.assert_array_equal(inward[0].faces, surfaces[0].faces[:, ::-1])
+
+
+def test_labels_come_in_the_order_asked_for_and_end_on_the_sides():
+    volume = np.random.default_rng(8).integers(0, 4, (6, 7, 5))
+    expected = extract_interfaces(volume, [3, 1], closed=False)
+    surfaces = extract_isosurface(volume, labels=[3, 1, 9])
+    assert [surface.label for surface in surfaces] == [3, 1, 9]
+    for surface in surfaces[:2]:
+        np.testing.assert_array_equal(surface.faces, expected.surface(surface.label).faces)
+    assert surfaces[2].faces.shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"labels": "some"}, "labels must be 'all' or a list of integers, got 'some'"),
+        ({"labels": [0, 1]}, "labels must not be 0, which is the background"),
+        ({"labels": [1], "level": 0.5}, "labels do not go with level"),
+        ({"labels": [1], "lattice": "bcc", "refine": 2}, "do not go with lattice, refine"),
+        ({"labels": [1], "normals": "out"}, "normals must be 'lower' or 'higher'"),
+        ({"labels": 4}, "labels must be"),
+        ({}, "level must be a finite number"),
+    ],
+)
+def test_wrong_labels(options: dict, message: str):
+    with pytest.raises(OptionError, match=message):
+        extract_isosurface(np.zeros((3, 3, 3), int), **options)
+
+
+@needs_data
+def test_every_label_of_the_frog_is_watertight():
+    """Each has the topology of its isosurface alone, by the definition of what is connected."""
+    with np.load(data_dir() / "volumes" / "frog_tissue_labels.npz") as file:
+        volume, spacing = file["data"], file["spacing"].astype(float)
+    surfaces = extract_isosurface(volume, labels="all", spacing=spacing, closed=True)
+    assert [surface.label for surface in surfaces] == np.unique(volume[volume > 0]).tolist()
+    for surface in surfaces:
+        report = topology(*surface)
+        assert report.is_manifold
+        assert report.is_closed
+        assert report.is_oriented
+        alone = extract_isosurface(
+            np.pad(volume == surface.label, 1), 0.5, spacing=spacing, closed=True
+        )
+        assert report.same_topology(topology(*alone))
+        assert models.signed_volume(*surface) > 0

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -95,6 +98,49 @@ def test_tiles(tmp_path, compression):
     data = samples(np.uint16, (50, 60, 7))
     tifffile.imwrite(tmp_path / "a.tif", data.T, tile=(32, 32), compression=compression)
     assert_holds(read_volume(tmp_path / "a.tif"), data, np.eye(4))
+
+
+LOSSLESS = ["lzw", "zstd", "packbits", "adobe_deflate", "lzma"]
+
+
+@pytest.mark.parametrize("compression", LOSSLESS)
+@pytest.mark.parametrize("predictor", [False, True])
+def test_compressions_without_loss(tmp_path, compression, predictor):
+    pytest.importorskip("imagecodecs")
+    if predictor and compression == "packbits":
+        pytest.skip("has none")
+    data = samples(np.uint16, (50, 60, 7))
+    options = {"compression": compression, "predictor": predictor}
+    tifffile.imwrite(tmp_path / "a.tif", data.T, **options)
+    volume = read_volume(tmp_path / "a.tif")
+    assert isinstance(volume.data, LazyArray)
+    assert_holds(volume, data, np.eye(4))
+    (tmp_path / "folder").mkdir()
+    for k, plane in enumerate(data.T):
+        tifffile.imwrite(tmp_path / "folder" / f"{k}.tif", plane, **options)
+    assert_holds(read_volume(tmp_path / "folder"), data, np.eye(4))
+
+
+@pytest.mark.parametrize("is_folder", [False, True])
+def test_a_codec_that_is_missing_is_told_before_any_work(tmp_path, is_folder):
+    pytest.importorskip("imagecodecs")
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, samples(np.uint16).T, compression="lzw")
+    code = (
+        "import sys\n"
+        "sys.modules['imagecodecs'] = None\n"
+        "from tetsimplify.errors import MissingExtraError\n"
+        "from tetsimplify.io import read_volume\n"
+        "try:\n    read_volume(sys.argv[1])\n"
+        "except MissingExtraError as error:\n    print(error)\n"
+    )
+    given = tmp_path if is_folder else path
+    told = subprocess.run(
+        [sys.executable, "-c", code, str(given)], capture_output=True, text=True, check=True
+    )
+    assert told.stdout.strip() == (
+        'reading TIFF with LZW compression needs imagecodecs: pip install "tetsimplify[volumes]"'
+    )
 
 
 def test_several_images(tmp_path):

@@ -187,8 +187,8 @@ def test_random_volume(seed: int, lattice: str):
 
 @pytest.mark.slow
 @every_lattice
-@pytest.mark.parametrize("hundred", range(100))
-def test_ten_thousand_random_volumes(hundred: int, lattice: str):
+@pytest.mark.parametrize("hundred", range(10))
+def test_a_thousand_random_volumes_against_the_oracle(hundred: int, lattice: str):
     for seed in range(100 * hundred, 100 * hundred + 100):
         check_random_volume(seed, lattice)
 

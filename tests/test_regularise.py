@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 import models
 import naive
-from tetsimplify import extract_isosurface, quality, topology
+from tetsimplify import OptionError, extract_isosurface, quality, regularise, topology
 from tetsimplify.lattices import LATTICES
+from tetsimplify.regularise import contracted
 
 every_lattice = pytest.mark.parametrize("lattice", LATTICES)
 
@@ -148,6 +149,66 @@ def test_data_of_vertices_are_means_too(lattice: str):
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1)
     flat = models.normals(*surface)
     assert ((flat[:, None] * normals[surface.faces]).sum(axis=2) > 0).mean() > 0.99
+
+
+def turns(faces: NDArray, cluster: NDArray, vertices: NDArray) -> NDArray:
+    """By how many degrees each face that is left turns, one by one."""
+    found = []
+    for face in faces:
+        groups = cluster[face]
+        if len(set(groups.tolist())) == 3 and (groups != face).any():
+            means = np.array([vertices[cluster == group].mean(axis=0) for group in groups])
+            p, q = models.normals(vertices, face[None])[0], models.normals(means, [[0, 1, 2]])[0]
+            cosine = p @ q / np.linalg.norm(p) / np.linalg.norm(q)
+            found.append(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    return np.array(found)
+
+
+@every_lattice
+@pytest.mark.parametrize("foldover", [30.0, 90.0, None])
+def test_no_face_turns_by_more_than_the_guard_allows(
+    lattice: str, foldover: float | None, monkeypatch: pytest.MonkeyPatch
+):
+    """A noisy volume, where without the guard faces fold over."""
+    seen = []
+
+    def watched(faces: NDArray, cluster: NDArray, rows: dict) -> object:
+        seen.append((faces, cluster, rows[""]))
+        return contracted(faces, cluster, rows)
+
+    monkeypatch.setattr(regularise, "contracted", watched)
+    volume = np.random.default_rng(5).normal(size=(7, 7, 7))
+    surface = extract_isosurface(
+        volume, 0.0, lattice=lattice, regularise=True, foldover=foldover, spacing=(1, 2, 3)
+    )
+    assert naive.summary(surface.faces).is_sound
+    largest = turns(*seen[0]).max()
+    assert largest > 90 if foldover is None else largest <= foldover + 1e-6
+
+
+@every_lattice
+def test_the_guard_costs_little_on_smooth_surfaces(lattice: str):
+    volume = models.gyroid(40)
+    guarded, free = (
+        extract_isosurface(volume, 0.1, lattice=lattice, regularise=True, foldover=foldover)
+        for foldover in (90, None)
+    )
+    assert len(free.faces) <= len(guarded.faces) < 1.02 * len(free.faces)
+
+
+def test_the_guard_is_on_by_default():
+    volume = np.random.default_rng(5).normal(size=(9, 9, 9))
+    counts = [
+        len(extract_isosurface(volume, 0.0, regularise=True, **options).faces)
+        for options in ({}, {"foldover": 90.0}, {"foldover": None})
+    ]
+    assert counts[0] == counts[1] > counts[2]
+
+
+@pytest.mark.parametrize("foldover", [0, -5, 181, "off", True, np.nan])
+def test_wrong_guards(foldover: object):
+    with pytest.raises(OptionError, match="foldover must be above 0 and up to 180, or None, got"):
+        extract_isosurface(np.zeros((3, 3, 3)), 0.5, regularise=True, foldover=foldover)
 
 
 def test_nothing_becomes_nothing():

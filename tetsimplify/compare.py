@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tetsimplify.errors import OptionError
 from tetsimplify.options import Progress
 
 if TYPE_CHECKING:
@@ -41,7 +42,9 @@ def compare(
     keep_ratio: float | Sequence[float] | None = None,
     max_edge_length: float | str | Sequence[float | str] | None = None,
     output: str | os.PathLike[str] | None = None,
+    regularised: bool = False,
     level: float | Sequence[float] | None = None,
+    lattice: str = "kuhn",
     repair: bool = False,
     repeats: int = 3,
     time_limit: float = 600.0,
@@ -64,17 +67,22 @@ def compare(
         Names in :data:`tetsimplify.standard.METHODS`, or methods of your own; all of
         :data:`~tetsimplify.standard.METHODS` if not given.
     keep_ratio : float or several, optional
-        Parts of the faces to keep. Either this or the next one is given.
+        Parts of the faces to keep. This or one of the next two is given.
     max_edge_length : float, str or several, optional
         Lengths in the units of the inputs, or percentages of their median edges such as
         ``"120%"``. Methods that do not go by length get the number of faces that the contraction
         of all shorter edges comes to.
+    regularised : bool
+        For files of volumes: extract the surface by regularised marching tetrahedra, and simplify
+        the plain surface to as many faces by the other methods.
     output : path-like, optional
         Folder for the report: `results.json`, `results.csv`, `index.html` and the meshes. Runs
         that are finished there already, with the same input, options, versions and processor,
         are not done again.
     level : float or several, optional
         Iso-value of the volumes: one for all, or one for each.
+    lattice : {"kuhn", "five", "bcc"}
+        How the cubes of volumes are cut; see :func:`tetsimplify.extract_isosurface`.
     repair : bool
         Make inputs that are no oriented manifolds such ones first. Else they are refused.
     repeats : int
@@ -117,8 +125,11 @@ def compare(
     from tetsimplify.standard import chosen
 
     settings = Settings(repeats, time_limit, tolerance, clock)
-    wanted, asked = chosen(methods), criteria(keep_ratio, max_edge_length)
-    given = load(inputs, level=level, repair=repair)
+    asked = criteria(keep_ratio, max_edge_length, regularised)
+    wanted = [method for method in chosen(methods) if asked[0].suits(method)]
+    if methods is not None and len(wanted) < len(chosen(methods)):
+        raise OptionError("tetsimplify-regularised goes with regularised, and with nothing else")
+    given = load(inputs, level=level, lattice=lattice, repair=repair)
     tasks = [
         Task(one, method, criterion)
         for one in given

@@ -60,6 +60,64 @@ class Interfaces(NamedTuple):
         return Mesh(self.vertices[used], faces.reshape(-1, 3).astype(np.int32))
 
 
+class LabelSurface(Mesh):
+    """The surface of one label: a pair of `vertices` and `faces`, and its `label`."""
+
+    label: int
+
+    def __new__(
+        cls, vertices: NDArray[np.float64], faces: NDArray[np.int32], label: int = 0
+    ) -> LabelSurface:
+        """Make one of its parts."""
+        self = super().__new__(cls, vertices, faces)
+        self.label = label
+        return self
+
+
+def label_surfaces(
+    volume: ArrayLike,
+    labels: Sequence[int] | str,
+    *,
+    is_outward: bool = True,
+    **options: Any,
+) -> list[LabelSurface]:
+    """Extract one surface for each of some labels.
+
+    Parameters
+    ----------
+    volume : array_like, shape (n0, n1, n2), any integer or boolean dtype
+    labels : "all" or sequence of int
+        "all" are all that there are but the background, which is 0.
+    is_outward : bool
+        Whether normals point away from the label, or to it.
+    **options
+        Those of :func:`extract_interfaces`.
+
+    Returns
+    -------
+    list of LabelSurface
+        In the order of `labels`, or of their numbers. Empty ones for labels that there are not.
+
+    Raises
+    ------
+    VolumeError, OptionError
+        See :func:`extract_interfaces`.
+    """
+    if isinstance(labels, str) and labels != "all":
+        raise OptionError(f"labels must be 'all' or a list of integers, got {labels!r}")
+    wanted = _as_labels(None if isinstance(labels, str) else labels)
+    if wanted is not None and BACKGROUND in wanted:
+        raise OptionError(f"labels must not be {BACKGROUND}, which is the background")
+    found = extract_interfaces(volume, wanted, **options)  # type: ignore[arg-type]
+    each = found.labels[found.labels != BACKGROUND] if wanted is None else wanted
+    surfaces = []
+    for label in each.tolist():
+        vertices, faces = found.surface(label)
+        faces = faces if is_outward else np.ascontiguousarray(faces[:, ::-1])
+        surfaces.append(LabelSurface(vertices, faces, label))
+    return surfaces
+
+
 def extract_interfaces(
     volume: ArrayLike,
     labels: Sequence[int] | None = None,

@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from tetsimplify.arrays import as_triple, as_volume
 from tetsimplify.errors import OptionError, VolumeError
+from tetsimplify.interfaces import label_surfaces
 from tetsimplify.lattices import LATTICES, lattice_named
 from tetsimplify.levels import as_levels
 from tetsimplify.march import Block, March, Rows, blocks
 from tetsimplify.mesh import Mesh
 from tetsimplify.planes import Planes, as_sliceable
-from tetsimplify.regularise import regular
-from tetsimplify.sampling import Function, SampledFunction, sampled
+from tetsimplify.regularise import DEFAULT_FOLDOVER, as_foldover, regular
+from tetsimplify.sampling import Function, Refined, SampledFunction, as_factor, sampled
 from tetsimplify.tables import lattice_tables
 from tetsimplify.vertex_data import VertexData, as_fields
 from tetsimplify.workers import Workers
@@ -56,8 +57,9 @@ class Isosurface(Mesh):
 
 def extract_isosurface(
     volume: ArrayLike | Function,
-    level: float | str | Sequence[float | str],
+    level: float | str | Sequence[float | str] | None = None,
     *,
+    labels: Sequence[int] | str | None = None,
     spacing: Sequence[float] = (1.0, 1.0, 1.0),
     origin: Sequence[float] = (0.0, 0.0, 0.0),
     bounds: Sequence[Sequence[float]] | None = None,
@@ -66,7 +68,9 @@ def extract_isosurface(
     centres: Any = None,
     closed: bool = False,
     normals: str = "lower",
+    refine: int = 1,
     regularise: bool = False,
+    foldover: float | None = DEFAULT_FOLDOVER,
     vertex_normals: bool = False,
     vertex_data: Mapping[str, Any] | None = None,
     threads: int | None = None,
@@ -86,6 +90,12 @@ def extract_isosurface(
     level : float, "otsu", or a list of these
         The iso-value. Samples equal to it count as outside. "otsu" parts the samples into two
         classes of least variance, and reads the volume twice for that.
+    labels : "all" or sequence of int, optional
+        Instead of a level, for volumes of integers: one surface for each of these labels, or for
+        each that there is but 0, of the interfaces that
+        :func:`~tetsimplify.interfaces.extract_interfaces` makes, so that neighbours fit. Of the
+        other options these go with it: `spacing`, `origin`, `closed` (which caps half a sample
+        outside), `normals`, `threads`, `progress`.
     spacing : three floats
         Distance between samples along the three axes, in the units that you want.
     origin : three floats
@@ -104,9 +114,15 @@ def extract_isosurface(
     normals : {"lower", "higher"}
         The side that normals point to. With "lower" the solid is where values are above the
         level, with "higher" where they are below.
+    refine : int
+        So many cubes along each edge of a cube, of samples by trilinear interpolation: nearer to
+        the surface of the trilinear function, for `refine` squared times the faces.
     regularise : bool
         Contract vertices that are near the same lattice point where that keeps the topology:
         regularised marching tetrahedra (Treece, Prager and Gee 1999).
+    foldover : float or None
+        With `regularise`, vertices are left where that would turn a face by more degrees; None
+        for no such guard.
     vertex_normals : bool
         Make unit normals at the vertices from the gradient of the volume, to be found as
         ``vertex_data["normals"]`` of the result.
@@ -123,9 +139,11 @@ def extract_isosurface(
     -------
     Isosurface, or list of Isosurface
         A :class:`~tetsimplify.Mesh` with its `level` and `vertex_data`; a list of them, in the
-        same order, when `level` is a list. Vertices at ``origin + spacing * index``, coordinates
-        in the order of the axes of the volume, which are taken as right-handed; faces in memory
-        order, neighbours near each other. Empty when nothing crosses the level.
+        same order, when `level` is a list; a list of
+        :class:`~tetsimplify.interfaces.LabelSurface` for `labels`. Vertices at
+        ``origin + spacing * index``, coordinates in the order of the axes of the volume, which are
+        taken as right-handed; faces in memory order, neighbours near each other. Empty when
+        nothing crosses the level.
 
     Raises
     ------
@@ -165,7 +183,32 @@ def extract_isosurface(
     >>> bool(abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.02)
     True
     """
+    if labels is not None:
+        given = {
+            "level": level is None,
+            "bounds": bounds is None,
+            "shape": shape is None,
+            "lattice": lattice == "kuhn",
+            "centres": centres is None,
+            "refine": refine == 1,
+            "regularise": not regularise,
+            "vertex_normals": not vertex_normals,
+            "vertex_data": not vertex_data,
+        }
+        if wrong := [name for name, is_default in given.items() if not is_default]:
+            raise OptionError(f"labels do not go with {', '.join(wrong)}")
+        return label_surfaces(
+            volume,  # type: ignore[arg-type]
+            labels,
+            is_outward=_is_lower(normals),
+            spacing=spacing,
+            origin=origin,
+            closed=closed,
+            threads=threads,
+            progress=progress,
+        )
     has_centres = lattice_named(lattice).has_centres
+    limit = as_foldover(foldover)
     frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
     source: Any = volume
     if callable(volume) and not hasattr(volume, "shape"):
@@ -177,18 +220,20 @@ def extract_isosurface(
     samples = as_volume(source)
     middles = _as_centres(centres, samples.shape, lattice)
     fields = as_fields(vertex_data, samples.shape, vertex_normals)
-    if normals not in ("lower", "higher"):
-        raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
+    above = _is_lower(normals)
+    factor = as_factor(refine)
+    if factor > 1 and (source is not volume or middles is not None):
+        raise OptionError("refine is for samples alone: a function has a shape, centres stay")
 
     with Workers(threads) as workers:
         levels = as_levels(level, samples)
+        if factor > 1:
+            samples, frame[0] = Refined(samples, factor), frame[0] / factor
+            fields = {name: Refined(field, factor, name) for name, field in fields.items()}
         planes, tables = Planes(samples), lattice_tables(lattice, closed)
         data = VertexData(fields, vertex_normals, workers)
         is_traced = data.is_wanted or regularise
-        marches = [
-            March(planes, one, normals == "lower", frame, tables, workers, is_traced)
-            for one in levels
-        ]
+        marches = [March(planes, one, above, frame, tables, workers, is_traced) for one in levels]
         rows = [data.rows() for _ in marches]
         for block in blocks(planes, middles, tables, workers, int(vertex_normals)):
             of_fields = data.take(block)
@@ -196,16 +241,24 @@ def extract_isosurface(
                 tell = _telling(progress, block, k, len(marches))
                 is_new = march.add(block, tell)
                 data.add(block, of_fields, march, is_new, rows[k])
-    surfaces = [_finished(*pair, regularise) for pair in zip(marches, rows, strict=True)]
+    surfaces = [
+        _finished(*pair, limit if regularise else None) for pair in zip(marches, rows, strict=True)
+    ]
     return surfaces if isinstance(level, list | tuple) else surfaces[0]
 
 
-def _finished(march: March, data: dict[str, Rows], is_regular: bool) -> Isosurface:
-    """Hand over a surface, made regular if that is wanted."""
+def _is_lower(normals: Any) -> bool:
+    if normals not in ("lower", "higher"):
+        raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
+    return bool(normals == "lower")
+
+
+def _finished(march: March, data: dict[str, Rows], cos_foldover: float | None) -> Isosurface:
+    """Hand over a surface, made regular where there is a guard for that."""
     faces, rows = march.faces.finish(), {"": march.vertices.finish()}
     rows |= {name: of_name.finish() for name, of_name in data.items()}
-    if is_regular:
-        faces, rows = regular(faces, rows, march)
+    if cos_foldover is not None:
+        faces, rows = regular(faces, rows, march, cos_foldover)
     return Isosurface(rows.pop(""), faces, march.level, rows)
 
 

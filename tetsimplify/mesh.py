@@ -7,6 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+NORMALS = "normals"
+"""What data of vertices are called that are their normals."""
+
 
 class Mesh(NamedTuple):
     """A triangle mesh as two arrays.

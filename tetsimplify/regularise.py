@@ -13,26 +13,55 @@ A set of clusters can be contracted all at once when
 
 Contracting 1 alone leaves a surface of the same topology, with faces of two and of one edge; faces
 of two edges between the same two clusters lie side by side, and closing them is harmless if they
-all do: that is what 2 tells. Clusters that fail are left as they were, and the rest looked at anew.
+all do: that is what 2 tells.
+
+Where a face would turn too far its clusters fail too: a mean of vertices on several sides of a thin
+place can lie beyond a neighbour, and the surface would fold over. Clusters that fail are left as
+they were, and the rest is looked at anew.
 """
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
+from tetsimplify.errors import OptionError
 from tetsimplify.march import March
+from tetsimplify.mesh import NORMALS
 from tetsimplify.tables import Tables
-from tetsimplify.vertex_data import NORMALS
 
 Indices = NDArray[np.int32]
 
 ON_BOUNDARY = 2**32  # counts as so many faces, more than there are
+DEFAULT_FOLDOVER = 90.0
+NO_GUARD = -2.0  # less than any cosine
+
+
+def as_foldover(degrees: Any) -> float:
+    """The cosine of the largest turn of a face, :data:`NO_GUARD` for None.
+
+    Raises
+    ------
+    OptionError
+        When it is neither an angle above 0 and up to 180 degrees nor None.
+    """
+    if degrees is None:
+        return NO_GUARD
+    is_number = isinstance(degrees, int | float) and not isinstance(degrees, bool)
+    if not is_number or not 0.0 < degrees <= 180.0:
+        raise OptionError(f"foldover must be above 0 and up to 180, or None, got {degrees!r}")
+    return math.cos(math.radians(degrees))
 
 
 def regular(
-    faces: Indices, rows: dict[str, NDArray[np.float64]], march: March
+    faces: Indices,
+    rows: dict[str, NDArray[np.float64]],
+    march: March,
+    cos_foldover: float = NO_GUARD,
 ) -> tuple[Indices, dict[str, NDArray[np.float64]]]:
     """Make a surface regular.
 
@@ -43,6 +72,8 @@ def regular(
         Positions and data of the vertices.
     march : March
         That made the surface, and kept the lattice edges of its vertices.
+    cos_foldover : float
+        Cosine of the largest turn of a face.
 
     Returns
     -------
@@ -50,7 +81,8 @@ def regular(
         What is left, in the same order.
     """
     edges, ratios = march.edges.rows, march.ratios.rows
-    cluster = clusters_of(faces, edges, ratios, march.tables, march.shape)
+    guard = Guard(faces, rows[""], cos_foldover)
+    cluster = clusters_of(faces, edges, ratios, march.tables, march.shape, guard)
     faces, rows = contracted(faces, cluster, rows)
     if NORMALS in rows:
         lengths = np.linalg.norm(rows[NORMALS], axis=1, keepdims=True)
@@ -64,6 +96,7 @@ def clusters_of(
     ratios: NDArray[np.float64],
     tables: Tables,
     shape: tuple[int, int, int],
+    guard: Guard,
 ) -> Indices:
     """Which vertices of an isosurface are to become one.
 
@@ -75,6 +108,8 @@ def clusters_of(
     tables : Tables
     shape : three ints
         Of the volume.
+    guard : Guard
+        Against folds.
 
     Returns
     -------
@@ -96,9 +131,62 @@ def clusters_of(
     piece = _pieces(faces, len(edges))
     while True:
         cluster = np.where(is_bad[cluster], np.arange(len(cluster), dtype=np.int32), cluster)
-        is_bad = _is_bad(cluster[faces], cluster[boundary], piece)
+        is_bad = _is_bad(cluster[faces], cluster[boundary], piece) | guard.is_bad(cluster)
         if not is_bad.any():
             return cluster
+
+
+class Guard:
+    """Tells the clusters around which faces would turn too far.
+
+    Parameters
+    ----------
+    faces : ndarray, shape (m, 3), int32
+    vertices : ndarray, shape (n, 3), float64
+    cos_foldover : float
+        Cosine of the largest turn of a face.
+    """
+
+    def __init__(self, faces: Indices, vertices: NDArray[np.float64], cos_foldover: float) -> None:
+        self._faces, self._vertices, self._cosine = faces, vertices, cos_foldover
+
+    def is_bad(self, cluster: Indices) -> NDArray[np.bool_]:
+        """Which clusters must not be contracted; shape (n,)."""
+        is_bad = np.zeros(len(cluster), np.bool_)
+        if self._cosine == NO_GUARD or not len(self._faces):
+            return is_bad
+        is_large = np.bincount(cluster, minlength=len(cluster)) > 1
+        mapped = cluster[self._faces]
+        a, b, c = mapped.T
+        moves = is_large[mapped].any(axis=1) & (a != b) & (b != c) & (c != a)
+        left = self._faces[moves]
+        means = _means(self._vertices, cluster)
+        before, after = _normals(self._vertices, left), _normals(means, mapped[moves])
+        # in the order of magnitude of lengths, since that of areas may underflow when squared
+        lengths = np.sqrt((before**2).sum(axis=1)) * np.sqrt((after**2).sum(axis=1))
+        turned = (before * after).sum(axis=1) < self._cosine * lengths
+        # of what has no area any more there is no telling where it looks
+        turned |= lengths == 0.0
+        wrong = mapped[moves][turned].ravel()
+        is_bad[wrong[is_large[wrong]]] = True
+        return is_bad
+
+
+def _normals(points: NDArray[np.float64], faces: Indices) -> NDArray[np.float64]:
+    """Normals of faces, as long as twice their areas."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _means(values: NDArray[np.float64], cluster: Indices) -> NDArray[np.float64]:
+    """The mean of each cluster, in the row of its first vertex."""
+    n = len(cluster)
+    counts = np.maximum(np.bincount(cluster, minlength=n), 1)
+    means = values.copy()
+    # from the first one on, so that what is equal stays so to the last bit
+    for column, target in zip(_columns(values - values[cluster]), _columns(means), strict=True):
+        target += np.bincount(cluster, column, n) / counts
+    return means
 
 
 def contracted(
@@ -121,15 +209,7 @@ def contracted(
     """
     is_first = cluster == np.arange(len(cluster))
     number = (np.cumsum(is_first) - 1).astype(np.int32)[cluster]
-    n = int(is_first.sum())
-    counts = np.bincount(number, minlength=n)
-    means = {}
-    for name, values in rows.items():
-        mean = values[is_first]
-        # from the first one on, so that what is equal stays so to the last bit
-        for column, target in zip(_columns(values - values[cluster]), _columns(mean), strict=True):
-            target += np.bincount(number, column, n) / counts
-        means[name] = mean
+    means = {name: _means(values, cluster)[is_first] for name, values in rows.items()}
     mapped = number[faces]
     a, b, c = mapped.T
     return np.ascontiguousarray(mapped[(a != b) & (b != c) & (c != a)]), means

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tetsimplify.arrays import as_mesh
-from tetsimplify.decimators import METHODS, Goal, Method
+from tetsimplify.decimators import LENGTH, METHODS, Goal, Method
 from tetsimplify.errors import MissingExtraError, OptionError
 from tetsimplify.mesh import Mesh
 
@@ -79,6 +79,8 @@ def simplify(
     if keep_ratio is not None:
         target_faces = faces_to_keep(keep_ratio, len(mesh.faces))
     goal = Goal(target_faces, max_edge_length, options)
+    if goal.kind not in found.takes and goal.kind != LENGTH:
+        raise OptionError(f"{found.name} starts from a volume, not from a mesh")
     if goal.kind not in found.takes:
         able = ", ".join(name for name, other in METHODS.items() if goal.kind in other.takes)
         raise OptionError(f"{found.name} does not go by edge length; these do: {able}")

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from tetsimplify import kernels
 from tetsimplify.errors import OptionError
 from tetsimplify.march import Block, March, Rows
+from tetsimplify.mesh import NORMALS
 from tetsimplify.planes import Planes, as_sliceable
 from tetsimplify.workers import Workers
 
-NORMALS = "normals"
 N_VERTICES_OF_PART = 2**16
 
 

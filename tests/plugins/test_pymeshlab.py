@@ -616,6 +616,23 @@ def test_isosurface_filter():
     assert empty.mesh_number() == 1
 
 
+def test_isosurface_filter_takes_the_options_of_extraction():
+    x, y, z = np.mgrid[-1:1:20j, -1:1:20j, -1:1:20j]
+    torus = 0.3 - np.hypot(np.hypot(x, y) - 0.6, z)
+    n_faces = {}
+    for name, options in {
+        "plain": {},
+        "regular": {"regularise": True},
+        "fine": {"refine": 2},
+    }.items():
+        ms = MeshSet()
+        ms.generate_isosurface_by_marching_tetrahedra(volume=torus, lattice="bcc", **options)
+        n_faces[name] = ms.current_mesh().face_number()
+        assert agree(ms).genus == 1
+    assert n_faces["regular"] < 0.4 * n_faces["plain"]
+    assert n_faces["fine"] > 3.5 * n_faces["plain"]
+
+
 # --- errors in PyMeshLab's words -----------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import tetsimplify
 from data import data_dir, needs_data
-from tetsimplify import MeshError, VolumeError, adapters
+from tetsimplify import MeshError, OptionError, VolumeError, adapters
 
 pyvista = pytest.importorskip("pyvista")
 plugin = pytest.importorskip("tetsimplify.plugins.pyvista")
@@ -214,6 +214,51 @@ def test_several_levels_are_one_mesh_with_their_scalars():
     result = both.tetsimplify.simplify(1.5)
     assert set(result["RTData"]) == {130.0, 180.0}
     assert result.tetsimplify.topology().same_topology(report)
+
+
+def test_isosurfaces_carry_what_is_asked_for():
+    image = wavelet()
+    image.spacing, image.direction_matrix = (1.0, 2.0, 0.5), np.diag([1.0, -1.0, 1.0])
+    image["double"] = 2 * image["RTData"]
+    surface = image.tetsimplify.isosurface(
+        [130.0, "otsu"], vertex_normals=True, vertex_data=["double"], lattice="bcc"
+    )
+    levels = surface["RTData"]
+    assert len(set(levels)) == 2
+    np.testing.assert_allclose(surface["double"], 2 * levels, rtol=1e-9)
+    assert surface.active_scalars_name == "RTData"
+    flat = surface.compute_normals(
+        point_normals=False, consistent_normals=False, auto_orient_normals=False
+    )["Normals"]
+    at_faces = surface.point_data.active_normals[surface.regular_faces].sum(axis=1)
+    assert ((flat * at_faces).sum(axis=1) > 0).mean() > 0.95
+    with pytest.raises(VolumeError, match="no point array 'x', only"):
+        image.tetsimplify.isosurface(130.0, vertex_data=["x"])
+
+
+def test_labels_are_one_mesh_with_their_numbers():
+    image = pyvista.ImageData(dimensions=(12, 8, 8), spacing=(1, 2, 3))
+    labels = np.zeros((8, 8, 12), int)
+    labels[2:6, 2:6, 2:5], labels[2:6, 2:6, 5:9] = 3, 7
+    image["id"] = labels.ravel()
+    surface = image.tetsimplify.isosurface(labels="all", closed=True)
+    assert set(surface["id"]) == {3, 7}
+    for label in (3, 7):
+        part = surface.extract_points(surface["id"] == label).extract_surface()
+        assert part.n_open_edges == 0
+    assert image.tetsimplify.isosurface(labels=[3]).n_points < surface.n_points
+    with pytest.raises(OptionError, match="level must be"):
+        image.tetsimplify.isosurface()
+
+
+def test_regularised_images():
+    image = wavelet()
+    plain, regular = (
+        image.tetsimplify.isosurface(150.0, lattice="bcc", regularise=on) for on in (False, True)
+    )
+    assert regular.n_cells < 0.4 * plain.n_cells
+    report = plain.tetsimplify.topology()
+    assert regular.tetsimplify.topology().same_topology(report)
 
 
 def test_images_without_fitting_scalars():

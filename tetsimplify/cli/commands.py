@@ -1,4 +1,4 @@
-"""The commands: isosurface, simplify, info, distance and demo."""
+"""The commands: simplify, info, distance and demo; isosurface and compare are beside."""
 
 from __future__ import annotations
 
@@ -11,31 +11,49 @@ from typing import Annotated, Any
 import typer
 
 from tetsimplify import __version__
-from tetsimplify.cli import compare, tables, values
+from tetsimplify.cli import compare, isosurface, tables, values
 from tetsimplify.cli.session import Session, session
+from tetsimplify.cli.steps import (
+    MESH_SUFFIXES,
+    VOLUME_SUFFIXES,
+    AsJson,
+    Debug,
+    Output,
+    Quiet,
+    header,
+    topology,
+    write,
+    wrote,
+)
+from tetsimplify.cli.volumes import (
+    Axes,
+    Channel,
+    Closed,
+    Key,
+    Lattice,
+    Level,
+    Normals,
+    Refine,
+    Regularise,
+    Spacing,
+    Time,
+    extract,
+    one_level,
+)
 from tetsimplify.cli.wanted import Wanted, diagonal, median_edge
 from tetsimplify.edges import edge_lengths
-from tetsimplify.errors import FileError, MissingExtraError, OptionError, VolumeError
+from tetsimplify.errors import FileError, MissingExtraError, OptionError
 from tetsimplify.io import (
-    MESH_FORMATS,
-    VOLUME_FORMATS,
-    Volume,
     check_target,
     is_mesh_file,
     is_volume_file,
-    isosurface_of,
     read_mesh,
-    read_volume,
-    write_mesh,
 )
 from tetsimplify.mesh import Mesh
 
-MESH_SUFFIXES = " ".join(MESH_FORMATS)
-VOLUME_SUFFIXES = " ".join(VOLUME_FORMATS)
 CRITERIA = "What stops it: the first of these that is reached, at least one is needed"
 CONTRACTIONS = "Which edges go, and where the new vertex is"
 GUARDS = "What is held"
-VOLUME_OPTIONS = "Volumes"
 
 app = typer.Typer(
     name="tetsimplify",
@@ -48,94 +66,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, for programs.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-Output = Annotated[
-    Path,
-    typer.Option("--output", "-o", metavar="MESH", help=f"Mesh to write: {MESH_SUFFIXES}"),
-]
-Level = Annotated[float | None, typer.Option(help="Iso-value.", rich_help_panel=VOLUME_OPTIONS)]
-Closed = Annotated[
-    bool,
-    typer.Option("--closed", help="Cap the surface on the sides.", rich_help_panel=VOLUME_OPTIONS),
-]
-Lattice = Annotated[
-    str | None,
-    typer.Option(help="How cubes are cut into tetrahedra: kuhn.", rich_help_panel=VOLUME_OPTIONS),
-]
-Normals = Annotated[
-    str | None,
-    typer.Option(help="Point to lower or higher values.", rich_help_panel=VOLUME_OPTIONS),
-]
-Key = Annotated[
-    str | None,
-    typer.Option(
-        help="What to take of a file that holds several: array, path, level, image, series.",
-        rich_help_panel=VOLUME_OPTIONS,
-    ),
-]
-Channel = Annotated[
-    int | None,
-    typer.Option(help="Which channel to take, from 0.", rich_help_panel=VOLUME_OPTIONS),
-]
-Time = Annotated[
-    int | None, typer.Option(help="Which time to take, from 0.", rich_help_panel=VOLUME_OPTIONS)
-]
-Axes = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LETTERS",
-        help="What the axes of an array are, where its file does not tell: zyx, tzcyx.",
-        rich_help_panel=VOLUME_OPTIONS,
-    ),
-]
-Spacing = Annotated[
-    str | None,
-    typer.Option(
-        metavar="A,B,C",
-        help="Distance between samples along the axes, instead of that in the file.",
-        rich_help_panel=VOLUME_OPTIONS,
-    ),
-]
-
-
-@app.command()
-def isosurface(
-    volume: Annotated[Path, typer.Argument(help=f"Volume to read: {VOLUME_SUFFIXES}")],
-    level: Annotated[float, typer.Option(help="Iso-value.")],
-    output: Output,
-    closed: Closed = False,
-    lattice: Lattice = None,
-    normals: Normals = None,
-    key: Key = None,
-    channel: Channel = None,
-    time: Time = None,
-    axes: Axes = None,
-    spacing: Spacing = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Extract the surface where a volume has the value --level, by marching tetrahedra."""
-    with session("isosurface", as_json=as_json, quiet=quiet, debug=debug) as this:
-        check_target(output)
-        options = {"lattice": lattice, "normals": normals, "closed": closed or None}
-        chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
-        mesh = _extract(this, volume, level, chosen, spacing, options)
-        found = _topology(this, mesh)
-        _write(this, output, mesh)
-        this.finish(
-            {
-                **_header(this, volume),
-                "level": level,
-                "topology": tables.topology_as_dict(found),
-                "seconds": this.seconds,
-            },
-            tables.topology_table("Topology", isosurface=found),
-            tables.seconds_table(this.seconds),
-            _wrote(this),
-        )
+isosurface.register(app)
 
 
 @app.command()
@@ -274,6 +205,8 @@ def simplify(
     closed: Closed = False,
     lattice: Lattice = None,
     normals: Normals = None,
+    refine: Refine = None,
+    regularise: Regularise = False,
     key: Key = None,
     channel: Channel = None,
     time: Time = None,
@@ -308,20 +241,26 @@ def simplify(
                 "shape": shape,
             }
         )
-        volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
+        volume_options = {
+            "lattice": lattice,
+            "normals": normals,
+            "closed": closed or None,
+            "refine": refine,
+            "regularise": regularise or None,
+        }
         chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
         mesh = _read(this, source, level, chosen, spacing, volume_options)
         result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
-        _write(this, output, Mesh(result.vertices, result.faces))
+        write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
             {
-                **_header(this, source),
+                **header(this, source),
                 **tables.simplification_as_dict(result.report),
                 "seconds": this.seconds,
             },
             *tables.simplification_tables(result.report, this.seconds),
             tables.headline(result.report),
-            _wrote(this),
+            wrote(this),
         )
 
 
@@ -336,13 +275,13 @@ def info(
     with session("info", as_json=as_json, quiet=quiet, debug=debug) as this:
         with this.stage("read"):
             surface = read_mesh(mesh)
-        found = _topology(this, surface)
+        found = topology(this, surface)
         lengths = edge_lengths(surface)
         shapes = _quality(this, surface)
         defects = tables.defect_table(found)
         this.finish(
             {
-                **_header(this, mesh),
+                **header(this, mesh),
                 "topology": tables.topology_as_dict(found),
                 "edge_lengths": tables.lengths_as_dict(lengths),
                 "quality": shapes.as_dict(),
@@ -387,7 +326,7 @@ def distance(
             found = surface_distance(first, second, tolerance=bound, progress=this.progress)
         this.finish(
             {
-                **_header(this, a),
+                **header(this, a),
                 "other": b,
                 "distance": tables.distance_as_dict(found),
                 "diagonal": whole,
@@ -422,7 +361,7 @@ def demo(
         length = work.MEDIAN_EDGES * median_edge(before)
         result = _simplify(this, before, max_edge_length=length)
         after = Mesh(result.vertices, result.faces)
-        _write(this, mesh_path, after)
+        write(this, mesh_path, after)
         try:
             with this.stage("draw"):
                 work.save_picture(picture_path, before, result)
@@ -431,7 +370,7 @@ def demo(
             this.note(f"no picture: {error}")
         this.finish(
             {
-                **_header(this, work.VOLUME),
+                **header(this, work.VOLUME),
                 "level": work.LEVEL,
                 **tables.simplification_as_dict(result.report),
                 "seconds": this.seconds,
@@ -441,69 +380,37 @@ def demo(
             "",
             *tables.simplification_tables(result.report, this.seconds),
             tables.headline(result.report),
-            _wrote(this),
+            wrote(this),
         )
 
 
 compare.register(app)
 
 
-def _header(this: Session, source: Path | str) -> dict[str, Any]:
-    made = {"command": this.command, "version": __version__, "input": source}
-    return {**made, "outputs": this.written} if this.written else made
-
-
-def _wrote(this: Session) -> str:
-    return f"Wrote {' and '.join(map(str, this.written))}"
-
-
 def _read(
     this: Session,
     source: Path,
-    level: float | None,
+    level: list[str] | None,
     chosen: dict[str, Any],
     spacing: str | None,
     options: dict[str, Any],
 ) -> Mesh:
     """Read a mesh, or extract one from a volume."""
     if is_volume_file(source):
-        if level is None:
+        if not level:
             raise OptionError(f"{source} is a volume, so --level is needed")
-        return _extract(this, source, level, chosen, spacing, options)
+        options = {**options, "level": one_level(level)}
+        mesh: Mesh = extract(this, source, chosen, spacing, options)
+        return mesh
     if not is_mesh_file(source):
         raise FileError(
             f"{source} has no known suffix; meshes have {MESH_SUFFIXES}, volumes {VOLUME_SUFFIXES}"
         )
-    given = {"level": level, **chosen, "spacing": spacing, **options}
+    given = {"level": level or None, **chosen, "spacing": spacing, **options}
     if wrong := [f"--{name}" for name, value in given.items() if value is not None]:
         raise OptionError(f"{', '.join(wrong)}: only for volumes, and {source} is a mesh")
     with this.stage("read"):
         return read_mesh(source)
-
-
-def _extract(
-    this: Session,
-    path: Path,
-    level: float,
-    chosen: dict[str, Any],
-    spacing: str | None,
-    options: dict[str, Any],
-) -> Mesh:
-    """Extract a surface from a volume, and explain when there is none."""
-    distances = None if spacing is None else values.parse_spacing(spacing)
-    with this.stage("read"):
-        volume: Volume = read_volume(path, **chosen)
-    if distances is not None:
-        volume = volume.with_spacing(distances)
-    given = {name: value for name, value in options.items() if value is not None}
-    with this.stage("extract"):
-        mesh = isosurface_of(volume, level, progress=this.progress, **given)
-    if not len(mesh.faces):
-        low, high = volume.value_range()
-        raise VolumeError(
-            f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
-        )
-    return mesh
 
 
 def _simplify(this: Session, mesh: Mesh, **options: Any) -> Any:
@@ -514,24 +421,11 @@ def _simplify(this: Session, mesh: Mesh, **options: Any) -> Any:
     return result
 
 
-def _topology(this: Session, mesh: Mesh) -> Any:
-    from tetsimplify.topology import topology
-
-    with this.stage("topology"):
-        return topology(*mesh)
-
-
 def _quality(this: Session, mesh: Mesh) -> Any:
     from tetsimplify.quality import quality
 
     with this.stage("quality"):
         return quality(*mesh)
-
-
-def _write(this: Session, path: Path, mesh: Mesh) -> None:
-    with this.stage("write"):
-        write_mesh(path, mesh)
-    this.written.append(path)
 
 
 def _show_version(wanted: bool) -> None:

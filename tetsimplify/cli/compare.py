@@ -13,6 +13,7 @@ from tetsimplify import __version__
 from tetsimplify.cli.session import Session, session
 from tetsimplify.cli.values import parse_length, parse_ratio
 from tetsimplify.errors import OptionError
+from tetsimplify.lattices import LATTICES
 
 if TYPE_CHECKING:
     from tetsimplify.compare import Comparison
@@ -67,6 +68,15 @@ def compare(
             rich_help_panel=CRITERIA,
         ),
     ] = None,
+    regularised: Annotated[
+        bool,
+        typer.Option(
+            "--regularised",
+            help="As many faces as regularised marching tetrahedra give, which take part: for "
+            "volumes.",
+            rich_help_panel=CRITERIA,
+        ),
+    ] = False,
     table1: Annotated[
         bool,
         typer.Option(
@@ -79,6 +89,13 @@ def compare(
         list[float] | None,
         typer.Option(
             help="Iso-value, of all volumes; given several times, of each in turn.",
+            rich_help_panel=VOLUME_OPTIONS,
+        ),
+    ] = None,
+    lattice: Annotated[
+        str | None,
+        typer.Option(
+            help=f"How cubes are cut into tetrahedra: {', '.join(LATTICES)}.",
             rich_help_panel=VOLUME_OPTIONS,
         ),
     ] = None,
@@ -133,7 +150,9 @@ def compare(
             "keep_ratio": _several(keep_ratio, lambda text: parse_ratio("--keep-ratio", text)),
             "max_edge_length": _several(max_edge_length, _as_length),
             "methods": None if methods is None else methods.split(","),
+            "regularised": regularised or None,
             "level": level or None,
+            "lattice": lattice,
             "repair": repair or None,
             "repeats": repeats,
             "time_limit": time_limit,

@@ -93,6 +93,20 @@ def topology_table(title: str, **reports: TopologyReport) -> Table:
     return made
 
 
+def surfaces_table(reports: dict[str, TopologyReport]) -> Table:
+    """Topologies of several surfaces, one row for each."""
+    made = table("Surfaces", "", "faces", "χ", "components", "boundary loops", "manifold")
+    for name, report in reports.items():
+        counts = (
+            report.n_faces,
+            report.euler_characteristic,
+            report.n_components,
+            report.n_boundary_loops,
+        )
+        made.add_row(name, *map(counted, counts), "yes" if report.is_manifold else "no")
+    return made
+
+
 def defect_table(report: TopologyReport) -> Table | None:
     """The first defects of each kind, None where there are none."""
     made = table("Defects", "kind", "count")

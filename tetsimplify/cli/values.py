@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from tetsimplify.errors import OptionError
 
@@ -69,3 +70,41 @@ def parse_spacing(text: str) -> tuple[float, float, float]:
     if len(lengths) != 3 or not all(0 < length < math.inf for length in lengths):
         raise OptionError(f"--spacing must be {expected}, got {text!r}")
     return lengths[0], lengths[1], lengths[2]
+
+
+def parse_levels(given: Sequence[str]) -> list[float | str]:
+    """Read iso-values, or ``otsu``, with commas between them or one by one."""
+    expected = "a number or otsu"
+    levels: list[float | str] = []
+    for word in (word.strip() for text in given for word in text.split(",")):
+        level = "otsu" if word.lower() == "otsu" else _number("--level", word, expected)
+        if level in (math.inf, -math.inf):
+            raise OptionError(f"--level must be {expected}, got {word!r}")
+        if level in levels:
+            raise OptionError(f"--level {word} is given twice")
+        levels.append(level)
+    return levels
+
+
+def parse_labels(text: str) -> list[int] | str:
+    """Read integers with commas between them, or ``all``."""
+    if text.lower() == "all":
+        return "all"
+    try:
+        labels = [int(word) for word in text.split(",")]
+    except ValueError:
+        raise OptionError(f"--labels must be all, or integers such as 1,4, got {text!r}") from None
+    if len(set(labels)) < len(labels):
+        raise OptionError(f"--labels {text} has one of them twice")
+    return labels
+
+
+def parse_named(option: str, given: Sequence[str]) -> dict[str, str]:
+    """Read pairs of a name and a file such as ``dose=dose.nii``."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, path = text.partition("=")
+        if not (name and equals and path) or name in found:
+            raise OptionError(f"{option} must be NAME=VOLUME, each name once, got {text!r}")
+        found[name] = path
+    return found

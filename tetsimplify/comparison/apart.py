@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import tetsimplify
-from tetsimplify.comparison.models import on_grid
+from tetsimplify.comparison.models import on_grid, samples_of
 from tetsimplify.comparison.tasks import Settings
 from tetsimplify.decimators import Goal, Method
 from tetsimplify.edges import edge_lengths
@@ -87,7 +87,11 @@ def _write_job(
 ) -> dict[str, Any]:
     """The files that a worker reads."""
     small = on_grid("gyroid", WARM_UP_GRID)
-    if goal.max_edge_length is None:
+    if goal.volume is not None:
+        np.savez(folder / "warm-up-volume.npz", data=samples_of("gyroid", WARM_UP_GRID))
+        path = str(folder / "warm-up-volume.npz")
+        warm_up = Goal(volume={**goal.volume, "path": path, "level": 0.0})
+    elif goal.max_edge_length is None:
         warm_up = Goal(target_faces=round(WARM_UP_RATIO * len(small.faces)), options=goal.options)
     else:
         length = WARM_UP_MEDIAN_EDGES * float(np.median(edge_lengths(small)))

@@ -19,6 +19,7 @@ from tetsimplify.comparison.models import DEFAULT_VERTICES, MODELS, model
 from tetsimplify.edges import edge_lengths
 from tetsimplify.errors import FileError, MeshError, OptionError
 from tetsimplify.io import is_mesh_file, is_volume_file, isosurface_of, read_mesh, read_volume
+from tetsimplify.lattices import lattice_named
 from tetsimplify.mesh import Mesh
 from tetsimplify.repair import repair as repair_mesh
 from tetsimplify.standard import as_result
@@ -38,6 +39,8 @@ class Input:
     topology: TopologyReport = field(repr=False)
     repairs: dict[str, int] | None = None
     """What was mended, None where nothing had to be."""
+    volume: Mapping[str, Any] | None = field(default=None, repr=False)
+    """What it was cut out of: `path`, `level`, `lattice`; None of meshes and models."""
 
     @cached_property
     def digest(self) -> str:
@@ -57,11 +60,29 @@ class Input:
         """The median edge length."""
         return float(np.median(edge_lengths(self.mesh)))
 
+    @cached_property
+    def n_regular_faces(self) -> int:
+        """Faces of the regularised surface of the volume.
+
+        Raises
+        ------
+        OptionError
+            When there is no volume.
+        """
+        if self.volume is None:
+            raise OptionError(
+                f"{self.name} is no file of a volume, so there is no surface of it to regularise"
+            )
+        volume = read_volume(self.volume["path"])
+        options = {"lattice": self.volume["lattice"], "regularise": True}
+        return len(isosurface_of(volume, self.volume["level"], **options).faces)
+
 
 def load(
     sources: Sequence[Any] | Mapping[str, Any],
     *,
     level: float | Sequence[float] | None = None,
+    lattice: str = "kuhn",
     repair: bool = False,
 ) -> list[Input]:
     """Read, extract or make all inputs.
@@ -73,6 +94,8 @@ def load(
         vertices and faces.
     level : float or sequence of floats, optional
         Of the volumes: one for all, or one for each in their order.
+    lattice : str
+        Of the volumes.
     repair : bool
         Make what is no oriented manifold one.
 
@@ -87,7 +110,10 @@ def load(
         raise OptionError("give at least one input")
     named = list(sources.items()) if isinstance(sources, Mapping) else _named(sources)
     levels = _levels(level, sum(_is_volume(source) for _, source in named))
-    return [_as_manifold(name, *_mesh_of(source, levels), repair) for name, source in named]
+    lattice_named(lattice)
+    return [
+        _as_manifold(name, *_mesh_of(source, levels, lattice), repair) for name, source in named
+    ]
 
 
 def _named(sources: Sequence[Any]) -> list[tuple[str, Any]]:
@@ -133,8 +159,10 @@ def _levels(level: float | Sequence[float] | None, n_volumes: int) -> Iterator[f
     return iter(given)
 
 
-def _mesh_of(source: Any, levels: Iterator[float]) -> tuple[str, Mesh]:
-    """What kind of input this is, and the mesh."""
+def _mesh_of(
+    source: Any, levels: Iterator[float], lattice: str
+) -> tuple[str, Mesh, dict[str, Any] | None]:
+    """What kind of input this is, the mesh, and the volume if there is one."""
     if not _is_path(source):
         try:
             vertices, faces = source
@@ -142,11 +170,13 @@ def _mesh_of(source: Any, levels: Iterator[float]) -> tuple[str, Mesh]:
             raise MeshError(
                 "an input must be a file, the name of a model, or a pair of vertices and faces"
             ) from error
-        return "mesh", as_mesh(vertices, faces)
+        return "mesh", as_mesh(vertices, faces), None
     if is_volume_file(source):
-        return "volume", isosurface_of(read_volume(source), next(levels))
+        level = next(levels)
+        volume = {"path": os.path.abspath(source), "level": level, "lattice": lattice}
+        return "volume", isosurface_of(read_volume(source), level, lattice=lattice), volume
     if is_mesh_file(source):
-        return "mesh", read_mesh(source)
+        return "mesh", read_mesh(source), None
     name, _, number = str(source).partition(":")
     if name not in MODELS:
         raise FileError(
@@ -155,10 +185,12 @@ def _mesh_of(source: Any, levels: Iterator[float]) -> tuple[str, Mesh]:
         )
     if number and not number.isdecimal():
         raise OptionError(f"{source}: the number of vertices must be a positive integer")
-    return "model", model(name, int(number) if number else DEFAULT_VERTICES)
+    return "model", model(name, int(number) if number else DEFAULT_VERTICES), None
 
 
-def _as_manifold(name: str, kind: str, mesh: Mesh, repair: bool) -> Input:
+def _as_manifold(
+    name: str, kind: str, mesh: Mesh, volume: dict[str, Any] | None, repair: bool
+) -> Input:
     """Repair what needs it, and check."""
     mesh = as_result(*mesh)
     if not len(mesh.faces):
@@ -172,4 +204,4 @@ def _as_manifold(name: str, kind: str, mesh: Mesh, repair: bool) -> Input:
         found = topology(*mesh)
     if (defects := found.defects()) is not None:
         raise MeshError(f"{name} is no oriented manifold, repair it first: {defects}")
-    return Input(name, kind, mesh, found, repairs)
+    return Input(name, kind, mesh, found, repairs, volume)

@@ -106,11 +106,15 @@ def model(name: str, n_vertices: int = DEFAULT_VERTICES) -> Mesh:
 
 def on_grid(name: str, n_samples: int) -> Mesh:
     """Extract a model from so many samples a side."""
-    shape, width = MODELS[name], MODELS[name].half_width
-    axis = np.linspace(-width, width, n_samples)
-    volume = shape.field(*np.meshgrid(axis, axis, axis, indexing="ij", sparse=True))
-    spacing = spacing_of(name, n_samples)
+    spacing, width = spacing_of(name, n_samples), MODELS[name].half_width
+    volume = samples_of(name, n_samples)
     return extract_isosurface(volume, 0.0, spacing=(spacing,) * 3, origin=(-width,) * 3)
+
+
+def samples_of(name: str, n_samples: int) -> Samples:
+    """The volume that a model is cut out of."""
+    axis = np.linspace(-MODELS[name].half_width, MODELS[name].half_width, n_samples)
+    return MODELS[name].field(*np.meshgrid(axis, axis, axis, indexing="ij", sparse=True))
 
 
 def spacing_of(name: str, n_samples: int) -> float:

@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tetsimplify.comparison.tasks import MAX_EDGE_LENGTH
+from tetsimplify.comparison.tasks import MAX_EDGE_LENGTH, REGULARISED
 
 UNIT = 1e-5  # of distances, in diagonals
 
@@ -65,6 +65,8 @@ def criterion_in_words(criterion: dict[str, float]) -> str:
     """What was asked for."""
     if MAX_EDGE_LENGTH in criterion:
         return f"edges below {criterion[MAX_EDGE_LENGTH]:.4g} contracted"
+    if REGULARISED in criterion:
+        return f"cut to the {criterion[REGULARISED]:,.0f} faces of the regularised surface"
     return f"cut to {100 * criterion['keep_ratio']:g} %"
 
 

@@ -11,13 +11,14 @@ from typing import Any
 
 from tetsimplify import kernels
 from tetsimplify.comparison.inputs import Input
-from tetsimplify.decimators import LENGTH, Goal, Method
+from tetsimplify.decimators import FACES, LENGTH, VOLUME, Goal, Method
 from tetsimplify.decimators.length import area_of, equilateral_edge
 from tetsimplify.errors import OptionError
 from tetsimplify.standard import faces_to_keep
 
 KEEP_RATIO = "keep_ratio"
 MAX_EDGE_LENGTH = "max_edge_length"
+REGULARISED = "regularised"
 CLOCKS = ("wall", "cpu")
 SHORT = 0.5  # of the edge of equilateral triangles: what counts as short where no length is given
 
@@ -47,7 +48,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Criterion:
-    """A part of the faces, or an edge length."""
+    """A part of the faces, an edge length, or the faces of the regularised surface."""
 
     name: str
     value: float
@@ -56,6 +57,8 @@ class Criterion:
 
     def on(self, given: Input) -> Criterion:
         """The criterion for one input, with its length in the units of that."""
+        if self.name == REGULARISED:
+            return Criterion(self.name, given.n_regular_faces)
         return (
             Criterion(self.name, self.value * given.median_edge) if self.in_median_edges else self
         )
@@ -65,11 +68,17 @@ class Criterion:
         """Whether it is an edge length."""
         return self.name == MAX_EDGE_LENGTH
 
+    def suits(self, method: Method) -> bool:
+        """Whether a method has something to do: those that start from a volume, with one only."""
+        return FACES in method.takes or (self.name == REGULARISED and VOLUME in method.takes)
+
     def __str__(self) -> str:
+        if self.name == REGULARISED:
+            return f"{self.value:,.0f} faces as regularised"
         return f"edges below {self.value:.4g}" if self.by_length else f"{100 * self.value:g} %"
 
 
-def criteria(keep_ratio: Any, max_edge_length: Any) -> list[Criterion]:
+def criteria(keep_ratio: Any, max_edge_length: Any, regularised: bool = False) -> list[Criterion]:
     """The criteria that are asked for: one, or several of a kind.
 
     Raises
@@ -77,8 +86,10 @@ def criteria(keep_ratio: Any, max_edge_length: Any) -> list[Criterion]:
     OptionError
         When not exactly one kind is given, or a value is wrong.
     """
-    if (keep_ratio is None) == (max_edge_length is None):
-        raise OptionError("give either keep_ratio or max_edge_length")
+    if (keep_ratio is not None) + (max_edge_length is not None) + bool(regularised) != 1:
+        raise OptionError("give either keep_ratio or max_edge_length or regularised")
+    if regularised:
+        return [Criterion(REGULARISED, 0.0)]
     given = max_edge_length if keep_ratio is None else keep_ratio
     values = list(given) if isinstance(given, (list, tuple)) else [given]
     if not values:
@@ -134,6 +145,9 @@ class Task:
         """
         if self.goes_by_length:
             return Goal(max_edge_length=self.criterion.value, options=self.options)
+        if self.criterion.name == REGULARISED:
+            volume = self.given.volume if VOLUME in self.method.takes else None
+            return Goal(int(self.criterion.value), options=self.options, volume=volume)
         if not self.criterion.by_length:
             n_by_length = faces_to_keep(self.criterion.value, len(self.given.mesh.faces))
         return Goal(target_faces=n_by_length, options=self.options)

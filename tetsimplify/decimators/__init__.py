@@ -12,14 +12,16 @@ from tetsimplify.decimators import (
     open3d,
     own,
     pymeshlab,
+    regularised,
     vtk,
 )
-from tetsimplify.decimators.method import FACES, LENGTH, Goal, Method
+from tetsimplify.decimators.method import FACES, LENGTH, VOLUME, Goal, Method
 
 METHODS = {
     method.name: method
     for module in (
         own,
+        regularised,
         meshoptimizer,
         fast_quadric,
         meshlib,
@@ -33,4 +35,4 @@ METHODS = {
 }
 """All methods by their names, in the order of tables: our own come first."""
 
-__all__ = ["FACES", "LENGTH", "METHODS", "Goal", "Method"]
+__all__ = ["FACES", "LENGTH", "METHODS", "VOLUME", "Goal", "Method"]

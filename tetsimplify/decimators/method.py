@@ -12,6 +12,7 @@ from tetsimplify.mesh import Mesh
 
 FACES = "faces"
 LENGTH = "length"
+VOLUME = "volume"
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,14 @@ class Goal:
     max_edge_length: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     """Further options of :func:`tetsimplify.simplify`, for the methods that are its own."""
+    volume: Mapping[str, Any] | None = None
+    """What the mesh is cut out of, for methods that start there: `path`, `level`, `lattice`."""
 
     @property
     def kind(self) -> str:
-        """``"faces"`` or ``"length"``."""
+        """``"faces"``, ``"length"`` or ``"volume"``."""
+        if self.volume is not None:
+            return VOLUME
         return FACES if self.max_edge_length is None else LENGTH
 
 
@@ -47,7 +52,7 @@ class Method:
     prepare: Callable[[Mesh, Goal], Any] = lambda mesh, goal: mesh
     finish: Callable[[Any], tuple[Any, Any]] = lambda result: result
     takes: tuple[str, ...] = (FACES,)
-    """What it can be asked for: a number of faces, an edge length."""
+    """What it can be asked for: a number of faces, an edge length; or a surface of a volume."""
     precision: str = "float64"
     """Of the coordinates that it takes or gives, whichever is less."""
     meets_count: bool = True

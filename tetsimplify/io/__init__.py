@@ -6,9 +6,17 @@ a format needs are imported when a file of that format is met.
 """
 
 from tetsimplify.io.lazy import LazyArray
-from tetsimplify.io.meshes import MESH_FORMATS, check_target, is_mesh_file, read_mesh, write_mesh
+from tetsimplify.io.meshes import (
+    MESH_FORMATS,
+    check_target,
+    is_mesh_file,
+    read_mesh,
+    write_mesh,
+    write_meshes,
+)
+from tetsimplify.io.surfaces import isosurface_of
 from tetsimplify.io.volume import Volume
-from tetsimplify.io.volumes import VOLUME_FORMATS, is_volume_file, isosurface_of, read_volume
+from tetsimplify.io.volumes import VOLUME_FORMATS, is_volume_file, read_volume
 
 __all__ = [
     "MESH_FORMATS",
@@ -22,4 +30,5 @@ __all__ = [
     "read_mesh",
     "read_volume",
     "write_mesh",
+    "write_meshes",
 ]

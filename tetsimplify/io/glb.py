@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tetsimplify.errors import FileError, MissingExtraError
 from tetsimplify.io.polygons import log
-from tetsimplify.mesh import Mesh
+from tetsimplify.mesh import NORMALS, Mesh
 
 
 def require() -> ModuleType:
@@ -36,9 +39,12 @@ def read(path: Path) -> Mesh:
     return Mesh(vertices.astype(np.float64), np.concatenate(faces).astype(np.int32))
 
 
-def write(path: Path, mesh: Mesh) -> None:
-    """Write a GLB file. Positions are rounded to single precision."""
+def write(path: Path, mesh: Mesh, data: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write a GLB file. Positions and normals are rounded to single precision."""
     if not len(mesh.faces):
         raise FileError("glTF allows no mesh without faces")
-    surface = require().Trimesh(mesh.vertices, mesh.faces, process=False, validate=False)
-    path.write_bytes(surface.export(file_type="glb"))
+    normals = data[NORMALS] if data else None
+    surface = require().Trimesh(
+        mesh.vertices, mesh.faces, vertex_normals=normals, process=False, validate=False
+    )
+    path.write_bytes(surface.export(file_type="glb", include_normals=bool(data)))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from tetsimplify.errors import FileError
 from tetsimplify.io.polygons import log, mesh_of_polygons
 from tetsimplify.io.text import parse_numbers, parse_rows, write_rows
-from tetsimplify.mesh import Mesh
+from tetsimplify.mesh import NORMALS, Mesh
 
 COMMENT = re.compile(rb"#[^\r\n]*")
 LINE_CONTINUED = re.compile(rb"\\\r?\n")
@@ -42,12 +44,17 @@ def read(path: Path) -> Mesh:
     return mesh_of_polygons(parse_rows(vertices, 3), n_corners, _as_indices(corners, before))
 
 
-def write(path: Path, mesh: Mesh) -> None:
-    """Write an OBJ file; positions are printed so that they read back exactly."""
+def write(path: Path, mesh: Mesh, data: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write an OBJ file; positions and normals are printed so that they read back exactly."""
+    numbers = mesh.faces.astype(np.int64) + 1
     with open(path, "wb") as file:
         file.write(b"# tetsimplify\n")
         write_rows(file, "v %r %r %r\n", mesh.vertices)
-        write_rows(file, "f %d %d %d\n", mesh.faces.astype(np.int64) + 1)
+        if data:
+            write_rows(file, "vn %r %r %r\n", data[NORMALS])
+            write_rows(file, "f %d//%d %d//%d %d//%d\n", np.repeat(numbers, 2, axis=1))
+        else:
+            write_rows(file, "f %d %d %d\n", numbers)
 
 
 def _lines(path: Path) -> list[bytes]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from tetsimplify.errors import FileError
 from tetsimplify.io.polygons import mesh_of_polygons
 from tetsimplify.io.text import parse_numbers, parse_rows, write_rows
-from tetsimplify.mesh import Mesh
+from tetsimplify.mesh import NORMALS, Mesh
 
 # Texture, colour and normal may follow the position of a vertex (ST, C, N). Positions in
 # four or in n dimensions (4, n) and binary files are not for us.
@@ -34,11 +36,13 @@ def read(path: Path) -> Mesh:
     return mesh_of_polygons(parse_rows(points, 3), *_parse_faces(faces))
 
 
-def write(path: Path, mesh: Mesh) -> None:
-    """Write an OFF file; positions are printed so that they read back exactly."""
+def write(path: Path, mesh: Mesh, data: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write an OFF file, NOFF with normals; numbers are printed to read back exactly."""
+    rows = np.hstack([mesh.vertices, data[NORMALS]]) if data else mesh.vertices
     with open(path, "wb") as file:
-        file.write(f"OFF\n{len(mesh.vertices)} {len(mesh.faces)} 0\n".encode("ascii"))
-        write_rows(file, "%r %r %r\n", mesh.vertices)
+        word = "NOFF" if data else "OFF"
+        file.write(f"{word}\n{len(mesh.vertices)} {len(mesh.faces)} 0\n".encode("ascii"))
+        write_rows(file, f"{' '.join(['%r'] * rows.shape[1])}\n", rows)
         write_rows(file, "3 %d %d %d\n", mesh.faces)
 
 

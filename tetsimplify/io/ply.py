@@ -13,7 +13,7 @@ Greg Turk, The PLY polygon file format, 1994.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tetsimplify.errors import FileError
 from tetsimplify.io.polygons import mesh_of_polygons
 from tetsimplify.io.text import parse_numbers
-from tetsimplify.mesh import Mesh
+from tetsimplify.mesh import NORMALS, Mesh
 
 Bytes = NDArray[np.uint8]
 Positions = NDArray[np.int64]
@@ -88,24 +88,43 @@ def read(path: Path) -> Mesh:
     return mesh_of_polygons(points, faces.counts, faces.values)
 
 
-def write(path: Path, mesh: Mesh) -> None:
-    """Write little-endian binary PLY with positions in double precision."""
+def write(path: Path, mesh: Mesh, data: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write little-endian binary PLY with positions and data of vertices in double precision."""
+    columns = {"x": mesh.vertices[:, 0], "y": mesh.vertices[:, 1], "z": mesh.vertices[:, 2]}
+    columns |= _columns(data or {})
+    properties = "".join(f"property double {name}\n" for name in columns)
     header = (
         "ply\nformat binary_little_endian 1.0\ncomment tetsimplify\n"
-        f"element vertex {len(mesh.vertices)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
+        f"element vertex {len(mesh.vertices)}\n{properties}"
         f"element face {len(mesh.faces)}\n"
         "property list uchar int vertex_indices\nend_header\n"
     )
     with open(path, "wb") as file:
         file.write(header.encode("ascii"))
-        mesh.vertices.astype("<f8", copy=False).tofile(file)
+        for start in range(0, len(mesh.vertices), ROWS_AT_ONCE):
+            some = slice(start, start + ROWS_AT_ONCE)
+            np.column_stack([c[some] for c in columns.values()]).astype("<f8").tofile(file)
         for start in range(0, len(mesh.faces), ROWS_AT_ONCE):
             faces = mesh.faces[start : start + ROWS_AT_ONCE]
             rows = np.empty(len(faces), [("count", "u1"), ("vertices", "<i4", 3)])
             rows["count"] = 3
             rows["vertices"] = faces
             rows.tofile(file)
+
+
+def _columns(data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Data of vertices column by column: nx, ny, nz are the normals, as readers expect them."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name, values in data.items():
+        parts = values.reshape(len(values), -1).T
+        word = "_".join(name.split())
+        names = [word] if values.ndim == 1 else [f"{word}_{k}" for k in range(len(parts))]
+        if name == NORMALS:
+            names = ["nx", "ny", "nz"]
+        if taken := {"x", "y", "z", *columns} & set(names):
+            raise FileError(f"two properties of its vertices would be called {min(taken)}")
+        columns |= dict(zip(names, parts, strict=True))
+    return columns
 
 
 def _read_header(file: BinaryIO) -> tuple[str, list[Element]]:

@@ -44,6 +44,7 @@ def read(path: Path, choice: Choice) -> Volume:
         _check_chain_of_pages(file)
         number = _number_of_image(file, choice.key)
         series = file.series[number]
+        _require_codec(series.keyframe)
         is_named = choice.axes is not None  # then axes of length 1 do not count
         shape = series.get_shape(squeeze=is_named)
         picked = pick(shape, _letters(series.get_axes(squeeze=is_named), shape), choice)
@@ -62,6 +63,8 @@ def read_folder(path: Path, choice: Choice) -> Volume:
     tifffile = require()
     names = [name.name for name in path.iterdir() if name.suffix.lower() in SUFFIXES]
     files = [path / name for name in tifffile.natural_sorted(names)]
+    with tifffile.TiffFile(files[0]) as file:
+        _require_codec(file.pages.first)
     first = tifffile.imread(files[0])
     if first.ndim != 2 and (first.ndim != 3 or first.shape[2] > MAX_COLOURS):
         raise FileError(f"{files[0].name} has shape {first.shape}, but is to be one plane")
@@ -78,6 +81,24 @@ def read_folder(path: Path, choice: Choice) -> Volume:
 
     data = LazyArray(planes, (len(files), *first.shape[:2]), first.dtype, path)
     return checked_volume(data.transpose(picked.order), affine_of())
+
+
+def _require_codec(page: Any) -> None:
+    """Find out before any work that a page is compressed in a way that needs another package.
+
+    Raises
+    ------
+    MissingExtraError
+        When it does, and that is not installed.
+    """
+    try:
+        require().TIFF.DECOMPRESSORS[page.compression]
+    except KeyError as error:
+        if "imagecodecs" not in str(error):
+            return  # nothing knows it, which reading will tell
+        name = getattr(page.compression, "name", page.compression)
+        purpose = f"reading TIFF with {name} compression"
+        raise MissingExtraError(purpose, "imagecodecs", "volumes") from error
 
 
 def _check_chain_of_pages(file: Any) -> None:

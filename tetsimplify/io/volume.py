@@ -58,13 +58,18 @@ class Volume(NamedTuple):
 
         Slices along the first axis are then read in one piece. Nothing is copied.
         """
+        order = self.slowest_order()
+        if order == [0, 1, 2]:
+            return self
+        return Volume(self.data.transpose(order), self.affine[:, [*order, 3]], self.unit)
+
+    def slowest_order(self) -> list[int]:
+        """The axes of :attr:`data` in the order of the file, the slowest first."""
         if isinstance(self.data, LazyArray):
             order = np.argsort(self.data.order)
         else:
             order = np.argsort([-abs(stride) for stride in self.data.strides], kind="stable")
-        if (order == (0, 1, 2)).all():
-            return self
-        return Volume(self.data.transpose(order.tolist()), self.affine[:, [*order, 3]], self.unit)
+        return [int(axis) for axis in order]
 
     def value_range(self) -> tuple[Any, Any]:
         """The least and the greatest value, NaN aside, read slab by slab."""

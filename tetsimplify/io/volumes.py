@@ -1,4 +1,4 @@
-"""Volumes out of files, and surfaces out of volumes."""
+"""Volumes out of files."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tetsimplify.errors import FileError, OptionError
 from tetsimplify.io import dicom, hdf5, metaimage, nifti, nrrd, numpy_files, ome_zarr, tiff, vti
 from tetsimplify.io.axes import Choice
 from tetsimplify.io.files import reading, suffix_among
 from tetsimplify.io.volume import Volume
-from tetsimplify.mesh import Mesh
 
 
 class VolumeFormat(NamedTuple):
@@ -157,55 +153,3 @@ def _format_of_folder(path: Path) -> VolumeFormat:
     if any(suffix_among(name, tiff.SUFFIXES) for name in names):
         return TIFF_FOLDER
     return DICOM
-
-
-def isosurface_of(
-    volume: Volume,
-    level: float,
-    *,
-    lattice: str = "kuhn",
-    closed: bool = False,
-    normals: str = "lower",
-    progress: Callable[[str, float], object] | None = None,
-) -> Mesh:
-    """Extract an isosurface and place it in the world.
-
-    Parameters
-    ----------
-    volume : Volume
-        Samples and their transform to the world. The cubes are taken along the axis that
-        is slowest in the file, so that a file is read once from start to end.
-    level, lattice, closed, normals, progress
-        See :func:`tetsimplify.extract_isosurface`.
-
-    Returns
-    -------
-    Mesh
-        In world coordinates. Normals point to the side asked for, whether the transform
-        mirrors or not.
-
-    Raises
-    ------
-    VolumeError, OptionError
-        See :func:`tetsimplify.extract_isosurface`.
-    """
-    from tetsimplify.isosurface import extract_isosurface
-
-    data, affine, _ = volume.slowest_first()
-    mesh = extract_isosurface(
-        data, level, lattice=lattice, closed=closed, normals=normals, progress=progress
-    )
-    vertices = _to_world(mesh.vertices, affine)
-    mirrors = np.linalg.det(affine[:3, :3]) < 0
-    return Mesh(vertices, np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrors else mesh.faces)
-
-
-def _to_world(points: NDArray[np.float64], affine: NDArray[np.float64]) -> NDArray[np.float64]:
-    # Spelled out, since a matrix product adds up in another order on another machine.
-    world = np.empty_like(points)
-    for axis in range(3):
-        world[:, axis] = affine[axis, 3]
-        for index in range(3):
-            if affine[axis, index]:
-                world[:, axis] += affine[axis, index] * points[:, index]
-    return world

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from tetsimplify.errors import FileError, MissingExtraError
 from tetsimplify.io.polygons import log, mesh_of_polygons
-from tetsimplify.mesh import Mesh
+from tetsimplify.mesh import NORMALS, Mesh
 
 POLYGONS = {5: "triangle", 7: "polygon", 9: "quad"}  # the cell types of VTK with plain corners
 
@@ -50,14 +51,22 @@ def read(path: Path) -> Mesh:
     return mesh_of_polygons(np.asarray(dataset.points), n_corners, corners)
 
 
-def write(path: Path, mesh: Mesh) -> None:
-    """Write polygonal data (VTK, VTP) or an unstructured grid (VTU), in binary."""
+def write(path: Path, mesh: Mesh, data: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Write polygonal data (VTK, VTP) or an unstructured grid (VTU), in binary.
+
+    Data of vertices become point arrays; the normals are those of VTK, by the name Normals.
+    """
     pyvista = require()
     if not len(mesh.faces):
         raise FileError("a mesh without faces is not for the formats of VTK")  # which may crash
     surface = pyvista.PolyData()
     surface.points = mesh.vertices
     surface.faces = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).reshape(-1)
+    for name, values in (data or {}).items():
+        if name == NORMALS:
+            surface.point_data.active_normals = values
+        else:
+            surface.point_data[name] = values
     dataset = surface.cast_to_unstructured_grid() if path.suffix.lower() == ".vtu" else surface
     with pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
         dataset.save(path)

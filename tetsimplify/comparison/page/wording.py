@@ -43,6 +43,8 @@ def criterion_name(criterion: Mapping[str, float]) -> str:
         return percent(criterion["keep_ratio"])
     if "max_edge_length" in criterion:
         return f"ε {criterion['max_edge_length']:.4g}"
+    if "regularised" in criterion:
+        return f"as regularised: {whole(criterion['regularised'])} faces"
     return ", ".join(f"{name} {value:.4g}" for name, value in criterion.items())
 
 
