@@ -165,17 +165,7 @@ def extract_isosurface(
     >>> bool(abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.02)
     True
     """
-    has_centres = lattice_named(lattice).has_centres
-    frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
-    source: Any = volume
-    if callable(volume) and not hasattr(volume, "shape"):
-        source, frame = _as_samples(volume, bounds, shape, frame)
-        if has_centres and centres is None:
-            centres = source.centres()
-    elif bounds is not None or shape is not None:
-        raise OptionError("bounds and shape are for functions; a volume has spacing and origin")
-    samples = as_volume(source)
-    middles = _as_centres(centres, samples.shape, lattice)
+    samples, middles, frame = as_source(volume, bounds, shape, spacing, origin, lattice, centres)
     fields = as_fields(vertex_data, samples.shape, vertex_normals)
     if normals not in ("lower", "higher"):
         raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
@@ -207,6 +197,30 @@ def _finished(march: March, data: dict[str, Rows], is_regular: bool) -> Isosurfa
     if is_regular:
         faces, rows = regular(faces, rows, march)
     return Isosurface(rows.pop(""), faces, march.level, rows)
+
+
+def as_source(
+    volume: Any,
+    bounds: Any,
+    shape: Any,
+    spacing: Any,
+    origin: Any,
+    lattice: str,
+    centres: Any,
+) -> tuple[Any, Planes | None, NDArray[np.float64]]:
+    """Check what is to be marched over: samples, centres where given, and spacing and origin."""
+    has_centres = lattice_named(lattice).has_centres
+    frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
+    source: Any = volume
+    if callable(volume) and not hasattr(volume, "shape"):
+        source, frame = _as_samples(volume, bounds, shape, frame)
+        if has_centres and centres is None:
+            centres = source.centres()
+    elif bounds is not None or shape is not None:
+        raise OptionError("bounds and shape are for functions; a volume has spacing and origin")
+    samples = as_volume(source)
+    middles = _as_centres(centres, samples.shape, lattice)
+    return samples, middles, frame
 
 
 def _as_samples(

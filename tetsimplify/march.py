@@ -8,7 +8,7 @@ triangles themselves. So the result is the same however it is divided.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -29,6 +29,18 @@ LEAST_SAMPLES_OF_SLAB = 2**15  # below that a thread takes longer to wake up tha
 GROWTH = 1.25  # of the arrays of the result: at most a quarter of them is to spare
 
 
+class Raw(NamedTuple):
+    """The surface of a block as a mesh of its own, complete but for what lies around its planes."""
+
+    vertices: NDArray[np.float64]
+    """Shape (n, 3): those of the block, and then those of the next plane."""
+    faces: NDArray[np.int32]
+    n_below: int
+    """So many of the first vertices are the last ones of the block before, in the same order."""
+    n_above: int
+    """So many of the last vertices are the first ones of the next block."""
+
+
 class Block(NamedTuple):
     """Planes of a volume that are taken at once, and as many more as their cubes need."""
 
@@ -45,18 +57,25 @@ class Block(NamedTuple):
 
 
 def blocks(
-    volume: Planes, centres: Planes | None, tables: Tables, workers: Workers, n_before: int = 0
+    volume: Planes,
+    centres: Planes | None,
+    tables: Tables,
+    workers: Workers,
+    n_before: int = 0,
+    ends: Sequence[int] | None = None,
 ) -> Iterator[Block]:
     """Read a volume block by block, with so many planes before each.
 
-    The planes that are read for a block end where those of a chunk end, if these are not too many.
+    Blocks end before the planes `ends`. If none are given, the planes that are read for a block end
+    where those of a chunk end, if these are not too many.
     """
     n_planes, n1, n2 = volume.shape
-    n_bytes = BYTES_IN_PLACE if volume.is_in_place else BYTES_AT_ONCE
-    at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (8 * n1 * n2))
-    at_once -= at_once % volume.planes_of_chunk if volume.planes_of_chunk < at_once else 0
     n_more = 3 if tables.has_centres else 2
-    ends = [*range(at_once - n_more, n_planes - n_more, at_once), n_planes]
+    if ends is None:
+        n_bytes = BYTES_IN_PLACE if volume.is_in_place else BYTES_AT_ONCE
+        at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (8 * n1 * n2))
+        at_once -= at_once % volume.planes_of_chunk if volume.planes_of_chunk < at_once else 0
+        ends = [*range(at_once - n_more, n_planes - n_more, at_once), n_planes]
     for begin, end in pairwise([0, *ends]):
         first, last = max(begin - n_before, 0), min(end + n_more, n_planes)
         samples = volume.take(first, last, workers)
@@ -108,17 +127,35 @@ class March:
         self.faces = Rows(np.int32, 3)
         self.edges = Rows(np.int64)
         self.ratios = Rows(np.float64)
+        self._n_shared = 0
 
     def add(self, block: Block, tell: Callable[[float], object]) -> slice:
         """Take the next block; return which vertices are new.
 
         `tell` is called with the part of the block that is done, from 0 to 1.
         """
+        return self._add(block, self._colours.window(block), tell)
+
+    def take(self, block: Block) -> Raw:
+        """Take the next block, and hand over its surface instead of adding it to what there is."""
         window = self._colours.window(block)
+        is_last = block.end == block.n_planes
+        n_above = 0 if is_last else self._count(window, (block.end, block.end + 1))[0]
+        self._add(block, window, lambda done: None, n_above)
+        raw = Raw(self.vertices.finish(), self.faces.finish(), self._n_shared, n_above)
+        self.vertices, self.faces = Rows(np.float64, 3), Rows(np.int32, 3)
+        self._n_shared = n_above
+        return raw
+
+    def _add(
+        self, block: Block, window: Any, tell: Callable[[float], object], n_above: int = 0
+    ) -> slice:
         slabs = self._workers.parts(block.begin, block.end, self._colours.least_planes)
         counts = np.array(self._workers.map(lambda slab: self._count(window, slab), slabs))
         before = self.vertices.n_rows, self.faces.n_rows
         ends = np.cumsum(counts, axis=0) + before
+        ends[-1, 0] += n_above  # which the last slab places, too
+        counts[-1, 0] += n_above
         n_vertices, n_faces = ends[-1].tolist()
         for n, name in ((n_vertices, "vertices"), (3 * n_faces, "face corners")):
             if n > MAX_CORNERS:
