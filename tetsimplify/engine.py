@@ -78,6 +78,8 @@ class Engine:
     n_threads : int
     min_faces : int
         So many faces are to be left.
+    is_part : bool
+        Whether this is a part of a surface, of which nothing need be told.
 
     Raises
     ------
@@ -112,6 +114,7 @@ class Engine:
         self.options, self.rules = options, options.rules()
         self._outer = options.outer_code()
         self.min_faces = options.fewest_faces(m)
+        self.is_part = False
         self.n_sweeps = 0
         self._watch = self._new_watch()
         n_coned = n + self.topology_before.n_boundary_loops
@@ -435,7 +438,7 @@ class Engine:
     def _remaining_edges(self) -> tuple[NDArray[np.int32], NDArray[np.str_]]:
         """The short edges that are left, and the reasons found when they were last tried."""
         surface, state = self._surface, kernels.state
-        if self.options.max_edge_length is None:
+        if self.options.max_edge_length is None or self.is_part:
             return np.empty((0, 2), np.int32), np.empty(0, np.str_)
         is_open = surface.corner_vertex[::3] != kernels.corners.DEAD
         if self._cost is None:

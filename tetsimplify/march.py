@@ -118,7 +118,7 @@ class March:
         if n1 * n2 > MAX_CORNERS:
             raise VolumeError(f"planes of {n1} x {n2} samples are too large")
         self.level, self.above, self.frame, self.tables = level, above, frame, tables
-        self.shape = volume.shape
+        self.volume, self.shape = volume, volume.shape
         self._colours = _Colours(volume, level, above, tables.has_centres, workers)
         self._workers, self._traced = workers, traced
         self._numbers_shape = (2, n1 * n2)

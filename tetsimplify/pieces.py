@@ -1,9 +1,9 @@
 r"""Pieces of a surface that is simplified before all of it is there.
 
-A piece is the surface of some planes of a volume. It is open where its neighbours join on: there the
-faces around a vertex are not all known. Such *open* vertices are locked, and so are their
-neighbours. What is free then has neighbours that are known entirely, and so has all that it is merged
-with: whether an edge can be contracted is decided exactly as in the whole surface::
+A piece is the surface of some planes of a volume. It is open where its neighbours join on: there
+the faces around a vertex are not all known. Such *open* vertices are locked, and so are their
+neighbours. What is free then has neighbours that are known entirely, and so has all that it is
+merged with: whether an edge can be contracted is decided exactly as in the whole surface::
 
     o-----o-----o-----o     open: faces above are missing           locked
      \   / \   / \   / \
@@ -35,6 +35,7 @@ Indices = NDArray[np.int32]
 
 N_RINGS = 4  # around what is open are kept to be contracted with the next piece
 FAR = np.int8(100)
+NO_VERTICES, NO_FACES = np.empty((0, 3)), np.empty((0, 3), np.int32)
 COUNTERS = ("N_SIMPLE", "N_NESTED", "N_LENS_VERTICES", "N_LENS_FACES")
 
 
@@ -96,28 +97,34 @@ def piece_of(raw: Raw) -> Piece:
 
 def empty_piece() -> Piece:
     """A piece of nothing."""
-    return piece_of(Raw(np.empty((0, 3)), np.empty((0, 3), np.int32), 0, 0))
+    return piece_of(Raw(NO_VERTICES, NO_FACES, 0, 0))
 
 
-def contracted(piece: Piece, options: Options) -> Piece:
-    """Contract all edges of a piece for whose ends all neighbours are known."""
+def contracted(box: list[Piece], options: Options) -> Piece:
+    """Contract all edges of a piece for whose ends all neighbours are known.
+
+    The piece is taken out of its box, so that its memory can be let go of on the way.
+    """
+    piece = box.pop()
     n = len(piece.vertices)
     ring = np.full(n, FAR)
     for opening in (piece.below, piece.above):
         ring[opening[opening >= 0]] = 0
     ring[piece.number >= 0] = 0
     is_open = np.flatnonzero(ring == 0).astype(np.int32)
-    corner_vertex = piece.faces.reshape(-1).copy()
+    corner_vertex = piece.faces.flatten()
     kernels.frontier.spread_rings(corner_vertex, ring, 1)
     locked = ring <= 1
     if locked[corner_vertex].all():
         return piece
 
     origin = _split_fans(corner_vertex, is_open, n)
-    mesh = Mesh(
-        np.concatenate([piece.vertices, piece.vertices[origin]]), corner_vertex.reshape(-1, 3)
-    )
-    engine = Engine(mesh, options, np.append(locked, np.ones(len(origin), np.bool_)), threads=1)
+    vertices = np.concatenate([piece.vertices, piece.vertices[origin]])
+    locked = np.append(locked, np.ones(len(origin), np.bool_))
+    piece = piece._replace(vertices=NO_VERTICES, faces=NO_FACES)  # which the engine copies
+    engine = Engine(Mesh(vertices, corner_vertex.reshape(-1, 3)), options, locked, threads=1)
+    del vertices, corner_vertex
+    engine.is_part = True
     run(engine)
     result = engine.result
     new = np.append(result.vertex_map, np.int32(-1))  # to be found by the index -1, too
@@ -132,7 +139,7 @@ def contracted(piece: Piece, options: Options) -> Piece:
         new[piece.below],
         new[piece.above],
         number,
-        piece.done + [engine.tally(name) for name in COUNTERS],
+        piece.done + np.array([engine.tally(name) for name in COUNTERS]),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
@@ -19,6 +18,7 @@ from tetsimplify.errors import OptionError
 from tetsimplify.isosurface import as_source
 from tetsimplify.levels import as_levels
 from tetsimplify.march import March, Raw, blocks
+from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.pieces import (
     COUNTERS,
@@ -37,7 +37,7 @@ from tetsimplify.tables import lattice_tables
 from tetsimplify.topology import TopologyReport
 from tetsimplify.workers import Workers
 
-SAMPLES_AT_ONCE = 2**22  # about so many make a block
+SAMPLES_AT_ONCE = 3 * 2**20  # about so many make a block
 LEAST_PLANES_AT_ONCE = 8  # of thinner blocks too much is open
 
 
@@ -147,17 +147,17 @@ def extract_and_simplify(
         raise OptionError(f"normals must be 'lower' or 'higher', got {normals!r}")
 
     clock = Clock()
-    with Workers(threads) as workers, clock.stage("stream"):
-        (number,) = as_levels(level, samples)
-        planes, tables = Planes(samples), lattice_tables(lattice, closed)
-        march = March(planes, number, normals == "lower", frame, tables, workers)
-        stream = _Stream(options, workers, progress, planes.shape[0])
-        ends = block_ends(planes.shape)
-        for block in blocks(planes, middles, tables, workers, ends=ends):
-            stream.add(march.take(block), block.end)
-        surface = stream.finish()
+    with clock.stage("stream"):
+        with Workers(threads) as workers:
+            (number,) = as_levels(level, samples)
+            march = March(
+                *(Planes(samples), number, normals == "lower", frame),
+                *(lattice_tables(lattice, closed), workers),
+            )
+            stream = _Stream(options, workers, progress)
+            mesh = stream.run(march, middles)
+        del march
     with clock.stage("check"):
-        mesh = surface.mesh()
         locked = np.zeros(len(mesh.vertices), np.bool_)
         engine = Engine(mesh, options, locked, threads=threads)
     whole = contract(
@@ -212,53 +212,51 @@ def block_ends(shape: tuple[int, int, int]) -> list[int]:
 class _Stream:
     """Contracts blocks beside each other, and joins them one after the other."""
 
-    def __init__(
-        self, options: Options, workers: Workers, progress: Progress | None, n_planes: int
-    ) -> None:
-        self._options, self._workers = options, workers
-        self._progress, self._n_planes = progress, n_planes
+    def __init__(self, options: Options, workers: Workers, progress: Progress | None) -> None:
+        self._options, self._workers, self._progress = options, workers, progress
         self._finished = Finished()
-        self._blocks: deque[tuple[Future[Piece], int]] = deque()
+        self._blocks: deque[tuple[Future[Piece], float]] = deque()
         self._rest = workers.submit(empty_piece)
         self._n_vertices = self._n_faces = 0
         self._shortest = np.inf
 
-    def add(self, raw: Raw, end: int) -> None:
-        """Take the surface of the next block, which ends before a plane."""
+    def run(self, march: March, centres: Planes | None) -> Mesh:
+        """All of the surface, as far as it can be contracted in parts."""
+        ends = block_ends(march.shape)
+        for block in blocks(march.volume, centres, march.tables, self._workers, ends=ends):
+            self._add(march.take(block), block.end / block.n_planes)
+        while self._blocks:
+            self._join()
+        self._rest.result()
+        return self._finished.mesh()
+
+    def _add(self, raw: Raw, done: float) -> None:
+        """Begin to contract the surface of the next block."""
         self._n_vertices += len(raw.vertices) - raw.n_above
         self._n_faces += len(raw.faces)
         shortest, _ = kernels.result.edge_extremes(raw.vertices, raw.faces.reshape(-1))
         self._shortest = min(self._shortest, shortest)
-        piece = piece_of(raw)
-        self._blocks.append((self._workers.submit(lambda: contracted(piece, self._options)), end))
-        if len(self._blocks) > self._workers.n_threads:
+        box = [piece_of(raw)]
+        self._blocks.append((self._workers.submit(lambda: contracted(box, self._options)), done))
+        if len(self._blocks) >= self._workers.n_threads:
             self._join()
-
-    def finish(self) -> Finished:
-        """All of the surface, as far as it could be contracted in parts."""
-        while self._blocks:
-            self._join()
-        self._rest.result()
-        return self._finished
 
     def _join(self) -> None:
         """Begin to join the next block to what is open of those before."""
-        block, end = self._blocks.popleft()
-        last = self._rest.result()
+        block, done = self._blocks.popleft()
+        last = [self._rest.result()]
 
         def task() -> Piece:
-            piece = contracted(joined(last, block.result()), self._options)
+            piece = contracted([joined(last.pop(), block.result())], self._options)
             return released(piece, self._finished)
 
         self._rest = self._workers.submit(task)
         if self._progress is not None:
-            self._progress("isosurface", end / self._n_planes)
+            self._progress("isosurface", done)
 
     def told(self, report: SimplificationReport) -> SimplificationReport:
         """The report on the last contractions as one on all of them."""
-        done = self._finished.done + [
-            getattr(report, name.lower()) for name in COUNTERS
-        ]
+        done = self._finished.done + [getattr(report, name.lower()) for name in COUNTERS]
         counts = dict(zip((name.lower() for name in COUNTERS), done.tolist(), strict=True))
         return replace(
             report,

@@ -1,7 +1,5 @@
 """The frontier of a surface that is not complete yet: rings around it, and fans at it."""
 
-import numpy as np
-
 from tetsimplify.kernels.corners import ahead, behind
 from tetsimplify.kernels.jit import kernel_in_place
 
