@@ -66,7 +66,8 @@ class Engine:
     mesh : Mesh
         Checked arrays; they are copied.
     options : Options
-    locked : ndarray, shape (n,), bool
+    locked : ndarray, shape (n,), bool or uint8
+        Vertices that stay; 2 where they are not merged with others either.
     bound : ndarray, shape (n,), float64, optional
         Largest quadric error that each vertex may come to, instead of that of the options.
     threads : int, optional
@@ -91,7 +92,7 @@ class Engine:
         self,
         mesh: Mesh,
         options: Options,
-        locked: NDArray[np.bool_],
+        locked: NDArray[np.bool_] | NDArray[np.uint8],
         bound: NDArray[np.float64] | None = None,
         threads: int | None = None,
     ) -> None:

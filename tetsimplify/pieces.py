@@ -17,6 +17,8 @@ were, since all their vertices are locked.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,8 +35,11 @@ from tetsimplify.schedule import run
 
 Indices = NDArray[np.int32]
 
+REACH = 2.0  # edges of a length are contracted where that many lengths away all is known
+MARGIN = 1.0  # lengths more, so that what is finished has been looked at from all sides
 N_RINGS = 4  # around what is open are kept to be contracted with the next piece
 FAR = np.int8(100)
+FIXED = 2  # vertices that stay and are merged with none
 NO_VERTICES, NO_FACES = np.empty((0, 3)), np.empty((0, 3), np.int32)
 COUNTERS = ("N_SIMPLE", "N_NESTED", "N_LENS_VERTICES", "N_LENS_FACES")
 
@@ -52,6 +57,9 @@ class Piece(NamedTuple):
     number: Indices
     """Shape (n,): number of each vertex in the result, -1 for those that are not there yet. Faces
     at the others are, in part or all."""
+    span: tuple[float, float]
+    """Where along the first axis the planes are behind which faces are missing, infinite where
+    there are none."""
     done: NDArray[np.int64]
     """Shape (4,): how much the `COUNTERS` have counted."""
 
@@ -82,7 +90,7 @@ class Finished:
         return Mesh(self._vertices.finish(), self._faces.finish())
 
 
-def piece_of(raw: Raw) -> Piece:
+def piece_of(raw: Raw, span: tuple[float, float]) -> Piece:
     """The surface of a block of planes."""
     n = len(raw.vertices)
     return Piece(
@@ -91,20 +99,33 @@ def piece_of(raw: Raw) -> Piece:
         np.arange(raw.n_below, dtype=np.int32),
         np.arange(n - raw.n_above, n, dtype=np.int32),
         np.full(n, -1, np.int32),
+        span,
         np.zeros(len(COUNTERS), np.int64),
     )
 
 
 def empty_piece() -> Piece:
     """A piece of nothing."""
-    return piece_of(Raw(NO_VERTICES, NO_FACES, 0, 0))
+    return piece_of(Raw(NO_VERTICES, NO_FACES, 0, 0), (-np.inf, np.inf))
 
 
-def contracted(box: list[Piece], options: Options) -> Piece:
-    """Contract all edges of a piece for whose ends all neighbours are known.
+def contracted(box: list[Piece], options: Options, lengths: Sequence[float]) -> Piece:
+    """Contract the edges of a piece, up to each of some lengths in turn.
+
+    The longer the edges, the farther they have to be from what is missing: so the surface becomes
+    finer and finer towards it, and what is missing is joined to a surface as fine as itself. At a
+    border between fine and coarse the coarse vertices would take up the fine ones one by one, and
+    move on, and the seam would come out coarser than the rest.
 
     The piece is taken out of its box, so that its memory can be let go of on the way.
     """
+    for length in lengths:
+        box.append(_contracted_to(length, box, replace(options, max_edge_length=length)))
+    return box.pop()
+
+
+def _contracted_to(length: float, box: list[Piece], options: Options) -> Piece:
+    """Contract the edges of a piece up to one length, for whose ends all neighbours are known."""
     piece = box.pop()
     n = len(piece.vertices)
     ring = np.full(n, FAR)
@@ -114,15 +135,16 @@ def contracted(box: list[Piece], options: Options) -> Piece:
     is_open = np.flatnonzero(ring == 0).astype(np.int32)
     corner_vertex = piece.faces.flatten()
     kernels.frontier.spread_rings(corner_vertex, ring, 1)
-    locked = ring <= 1
+    locked = (ring <= 1) | (_clearance(piece) < REACH * length)
     if locked[corner_vertex].all():
         return piece
 
     origin = _split_fans(corner_vertex, is_open, n)
     vertices = np.concatenate([piece.vertices, piece.vertices[origin]])
-    locked = np.append(locked, np.ones(len(origin), np.bool_))
+    held = np.full(len(vertices), FIXED, np.uint8)
+    held[:n] *= locked
     piece = piece._replace(vertices=NO_VERTICES, faces=NO_FACES)  # which the engine copies
-    engine = Engine(Mesh(vertices, corner_vertex.reshape(-1, 3)), options, locked, threads=1)
+    engine = Engine(Mesh(vertices, corner_vertex.reshape(-1, 3)), options, held, threads=1)
     del vertices, corner_vertex
     engine.is_part = True
     run(engine)
@@ -139,8 +161,16 @@ def contracted(box: list[Piece], options: Options) -> Piece:
         new[piece.below],
         new[piece.above],
         number,
+        piece.span,
         piece.done + np.array([engine.tally(name) for name in COUNTERS]),
     )
+
+
+def _clearance(piece: Piece) -> NDArray[np.float64]:
+    """How far each vertex is from the planes behind which something is missing, at least."""
+    low, high = piece.span
+    along = piece.vertices[:, 0]
+    return np.minimum(along - low, high - along)
 
 
 def _split_fans(corner_vertex: Indices, vertices: Indices, n_vertices: int) -> Indices:
@@ -172,17 +202,22 @@ def joined(last: Piece, piece: Piece) -> Piece:
         np.empty(0, np.int32),
         new[piece.above],
         np.concatenate([last.number, piece.number[is_own]]),
+        (-np.inf, piece.span[1]),
         last.done + piece.done,
     )
 
 
-def released(piece: Piece, finished: Finished) -> Piece:
-    """Move what is far from all that is open to the result, and hand back the rest."""
+def released(piece: Piece, finished: Finished, length: float) -> Piece:
+    """Move what is done and far from all that is open to the result, and hand back the rest.
+
+    What is done is at least so far that edges of this length were contracted.
+    """
     ring = np.full(len(piece.vertices), FAR)
     ring[piece.above[piece.above >= 0]] = 0
     corner_vertex = piece.faces.reshape(-1)
     kernels.frontier.spread_rings(corner_vertex, ring, N_RINGS)
-    is_kept = (ring[piece.faces] <= N_RINGS).any(axis=1)
+    is_near = (ring <= N_RINGS) | (_clearance(piece) < (REACH + MARGIN) * length)
+    is_kept = is_near[piece.faces].any(axis=1)
 
     faces = piece.faces[~is_kept]
     is_new = np.zeros(len(piece.vertices), np.bool_)
@@ -204,5 +239,6 @@ def released(piece: Piece, finished: Finished) -> Piece:
         np.empty(0, np.int32),
         new[piece.above],
         number[is_used],
+        piece.span,
         np.zeros(len(COUNTERS), np.int64),
     )

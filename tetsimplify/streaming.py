@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from tetsimplify.engine import Engine
 from tetsimplify.errors import OptionError
 from tetsimplify.isosurface import as_source
 from tetsimplify.levels import as_levels
-from tetsimplify.march import March, Raw, blocks
+from tetsimplify.march import March, blocks
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.pieces import (
@@ -38,6 +39,7 @@ from tetsimplify.topology import TopologyReport
 from tetsimplify.workers import Workers
 
 SAMPLES_AT_ONCE = 3 * 2**20  # about so many make a block
+STEP = 2.0  # from one length to the next one, up to that asked for
 LEAST_PLANES_AT_ONCE = 8  # of thinner blocks too much is open
 
 
@@ -175,10 +177,9 @@ def extract_and_simplify(
 
 def _as_options(**given: Any) -> Options:
     """Check the options of the contraction, and that they do not need the whole surface."""
-    try:
-        options = Options(**given)
-    except TypeError as error:
-        raise OptionError(f"there is no such option: {error}") from error
+    if unknown := sorted(given.keys() - {option.name for option in fields(Options)}):
+        raise TypeError(f"extract_and_simplify() has no option {unknown[0]!r}")
+    options = Options(**given)
     for name, why in (
         ("target_faces", "which edges are the cheapest"),
         ("keep_ratio", "which edges are the cheapest"),
@@ -209,6 +210,12 @@ def block_ends(shape: tuple[int, int, int]) -> list[int]:
     return [n_planes * (k + 1) // n_blocks for k in range(n_blocks)]
 
 
+def steps_to(length: float, spacing: float) -> list[float]:
+    """Lengths that grow by STEP from about that of the edges of a lattice to the one given."""
+    n_steps = max(0, math.ceil(math.log(max(length / spacing, 1.0), STEP)))
+    return [length / STEP**k for k in range(n_steps, -1, -1)]
+
+
 class _Stream:
     """Contracts blocks beside each other, and joins them one after the other."""
 
@@ -223,21 +230,29 @@ class _Stream:
     def run(self, march: March, centres: Planes | None) -> Mesh:
         """All of the surface, as far as it can be contracted in parts."""
         ends = block_ends(march.shape)
+        spacing, origin = march.frame[:, 0].tolist()
+        self._lengths = steps_to(self._options.max_edge_length or 0.0, march.frame[0].max())
         for block in blocks(march.volume, centres, march.tables, self._workers, ends=ends):
-            self._add(march.take(block), block.end / block.n_planes)
+            low = origin + spacing * block.begin if block.begin > 0 else -np.inf
+            high = origin + spacing * block.end if block.end < block.n_planes else np.inf
+            self._add(piece_of(march.take(block), (low, high)), block.end / block.n_planes)
         while self._blocks:
             self._join()
         self._rest.result()
         return self._finished.mesh()
 
-    def _add(self, raw: Raw, done: float) -> None:
+    def _add(self, piece: Piece, done: float) -> None:
         """Begin to contract the surface of the next block."""
-        self._n_vertices += len(raw.vertices) - raw.n_above
-        self._n_faces += len(raw.faces)
-        shortest, _ = kernels.result.edge_extremes(raw.vertices, raw.faces.reshape(-1))
+        self._n_vertices += len(piece.vertices) - len(piece.above)
+        self._n_faces += len(piece.faces)
+        shortest, _ = kernels.result.edge_extremes(piece.vertices, piece.faces.reshape(-1))
         self._shortest = min(self._shortest, shortest)
-        box = [piece_of(raw)]
-        self._blocks.append((self._workers.submit(lambda: contracted(box, self._options)), done))
+        box = [piece]
+
+        def task() -> Piece:
+            return contracted(box, self._options, self._lengths)
+
+        self._blocks.append((self._workers.submit(task), done))
         if len(self._blocks) >= self._workers.n_threads:
             self._join()
 
@@ -247,8 +262,9 @@ class _Stream:
         last = [self._rest.result()]
 
         def task() -> Piece:
-            piece = contracted([joined(last.pop(), block.result())], self._options)
-            return released(piece, self._finished)
+            piece = joined(last.pop(), block.result())
+            piece = contracted([piece], self._options, self._lengths)
+            return released(piece, self._finished, self._lengths[-1])
 
         self._rest = self._workers.submit(task)
         if self._progress is not None:
