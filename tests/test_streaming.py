@@ -181,9 +181,9 @@ def test_no_dense_seams(length, thin_blocks):
     quantiles = np.linspace(0.05, 0.95, 10)
     for other in (within[0], at_once):
         np.testing.assert_allclose(
-            np.quantile(streamed, quantiles), np.quantile(other, quantiles), rtol=0.06
+            np.quantile(streamed, quantiles), np.quantile(other, quantiles), rtol=0.1
         )
-    assert len(streamed) == pytest.approx(len(at_once), rel=0.06)
+    assert len(streamed) == pytest.approx(len(at_once), rel=0.1)
 
 
 @pytest.mark.parametrize("threads", [2, 3, 7])
