@@ -27,6 +27,8 @@ BYTES_IN_PLACE = 2**32  # the same where nothing is copied, so that the result c
 LEAST_PLANES_AT_ONCE = 4
 LEAST_SAMPLES_OF_SLAB = 2**15  # below that a thread takes longer to wake up than to work
 GROWTH = 1.25  # of the arrays of the result: at most a quarter of them is to spare
+LIKELY = 1.25  # times as many rows as if the other planes were like those before
+MOST_ROOM = 16  # times the rows that there are is made at once
 
 
 class Raw(NamedTuple):
@@ -160,11 +162,13 @@ class March:
         for n, name in ((n_vertices, "vertices"), (3 * n_faces, "face corners")):
             if n > MAX_CORNERS:
                 raise VolumeError(f"the surface has more than {MAX_CORNERS:,} {name}")
-        self.vertices.extend(n_vertices)
-        self.faces.extend(n_faces)
+        growth = LIKELY * block.n_planes / block.end if block.end < block.n_planes else 1.0
+        of_vertices = n_vertices, int(growth * n_vertices)
+        self.vertices.extend(*of_vertices)
+        self.faces.extend(n_faces, int(growth * n_faces))
         if self._traced:
-            self.edges.extend(n_vertices)
-            self.ratios.extend(n_vertices)
+            self.edges.extend(*of_vertices)
+            self.ratios.extend(*of_vertices)
         begins = ends - counts
         filled = self._workers.each(
             lambda k: self._fill(window, slabs[k], begins[k].tolist(), ends[k].tolist()),
@@ -269,8 +273,9 @@ def _moved(bits: NDArray[np.uint32], by: int, n_known: int, n: int) -> NDArray[n
 class Rows:
     """Numbers, or rows of numbers, that are added to, in an array that grows in place.
 
-    Where the system can map a large block of memory elsewhere nothing is copied, and nothing is
-    ever there twice.
+    Memory that is not written to costs nothing, so room is made for all rows that are likely. Where
+    they come to be more, and the system can map a large block of memory elsewhere, nothing is
+    copied; but what is new there is filled with zeros, which takes time.
     """
 
     def __init__(self, dtype: type, *shape: int) -> None:
@@ -282,10 +287,16 @@ class Rows:
         """A view of all rows, to be let go of before more are added."""
         return self._rows[: self.n_rows]
 
-    def extend(self, n_rows: int) -> None:
-        """Make room for so many rows in all."""
+    def extend(self, n_rows: int, n_likely: int = 0) -> None:
+        """Make room for so many rows in all, and at once for as many as it is likely to be."""
         if n_rows > len(self._rows):
-            self._resize(max(n_rows, int(GROWTH * len(self._rows))))
+            n_likely = min(n_likely, MOST_ROOM * n_rows)
+            if n_likely > 2 * len(self._rows):
+                rows = np.empty((max(n_rows, n_likely), *self._rows.shape[1:]), self._rows.dtype)
+                rows[: self.n_rows] = self.rows
+                self._rows = rows
+            else:
+                self._resize(max(n_rows, int(GROWTH * len(self._rows))))
         self.n_rows = n_rows
 
     def finish(self) -> NDArray[Any]:

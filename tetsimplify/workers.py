@@ -13,7 +13,7 @@ from tetsimplify.crew import Crew
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-PARTS_A_THREAD = 4  # so that threads that are done early take what is left
+PARTS_A_THREAD = 2  # so that threads that are done early take what is left
 LARGEST_PART = 32
 
 
