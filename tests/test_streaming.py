@@ -12,6 +12,7 @@ import naive
 from tetsimplify import (
     OptionError,
     VolumeError,
+    chunks,
     extract_and_simplify,
     extract_isosurface,
     simplify,
@@ -240,6 +241,21 @@ def test_planes_are_read_once_and_in_order(thin_blocks):
     assert max(np.subtract(ends, begins)) <= 4 + 1 + 2
 
 
+def test_chunks_are_read_whole_and_once(thin_blocks):
+    source = Slices(gyroid(30), (7, 30, 30))
+    thin_blocks(4)
+    extract_and_simplify(source, 0.0, max_edge_length=1.2)
+    assert source.taken == [(0, 7), (7, 14), (14, 21), (21, 28), (28, 30)]
+
+
+def test_large_chunks_are_read_in_parts(thin_blocks, monkeypatch):
+    source = Slices(gyroid(30), (30, 30, 30))
+    thin_blocks(4)
+    monkeypatch.setattr(chunks, "MOST_BYTES", 10 * 30 * 30 * 8)
+    extract_and_simplify(source, 0.0, max_edge_length=1.2)
+    assert len(source.taken) > 5
+
+
 def test_functions_centres_and_places():
     def ball(x, y, z):
         return 1.0 - x**2 - y**2 - z**2
@@ -338,7 +354,9 @@ def test_progress_rises_to_the_end_and_can_cancel(thin_blocks):
         ({"keep_ratio": 0.1}, "keep_ratio needs the whole surface"),
         ({"max_error": 0.1}, "max_error needs the whole surface"),
         ({"max_edge_length": 1.0, "intersections": "prevent"}, "intersections='prevent' needs"),
-        ({"max_edge_length": 1.0, "blocked": "violate"}, "not 'violate'"),
+        ({"max_edge_length": 1.0, "blocked": "violate"}, "not with blocked='violate'"),
+        ({"max_quadric_error": 0.1}, "quadrics need the whole surface"),
+        ({"max_edge_length": 1.0, "normal_deviation": 60.0}, "quadrics need the whole surface"),
         ({"max_edge_length": -1.0}, "max_edge_length must be at least 0"),
         ({"max_edge_length": 1.0, "normals": "up"}, "normals must be"),
         ({"max_edge_length": 1.0, "bounds": [(0, 1)] * 3}, "bounds and shape are for functions"),

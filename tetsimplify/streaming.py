@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetsimplify import kernels
+from tetsimplify.chunks import by_chunks
 from tetsimplify.contract import Clock, contract
 from tetsimplify.engine import Engine
 from tetsimplify.errors import OptionError
@@ -153,7 +154,7 @@ def extract_and_simplify(
         with Workers(threads) as workers:
             (number,) = as_levels(level, samples)
             march = March(
-                *(Planes(samples), number, normals == "lower", frame),
+                *(Planes(by_chunks(samples)), number, normals == "lower", frame),
                 *(lattice_tables(lattice, closed), workers),
             )
             stream = _Stream(options, workers, progress)
@@ -180,26 +181,25 @@ def _as_options(**given: Any) -> Options:
     if unknown := sorted(given.keys() - {option.name for option in fields(Options)}):
         raise TypeError(f"extract_and_simplify() has no option {unknown[0]!r}")
     options = Options(**given)
-    for name, why in (
-        ("target_faces", "which edges are the cheapest"),
-        ("keep_ratio", "which edges are the cheapest"),
-        ("max_error", "what the result is to be compared with"),
-    ):
-        if getattr(options, name) is not None:
-            raise _needs_all(name, why)
-    if options.uses_quadrics:
-        raise _needs_all("a quadric error", "what has been merged")
-    if options.blocked == "violate":
-        raise OptionError("blocks can only be joined when the topology is kept, not 'violate'")
-    if options.intersections != "allow":
-        raise _needs_all("intersections='prevent'", "what is to be kept apart")
+    if why := obstacle(options):
+        raise OptionError(f"{why}: call extract_isosurface and simplify")
     return options
 
 
-def _needs_all(name: str, why: str) -> OptionError:
-    return OptionError(
-        f"{name} needs the whole surface, to tell {why}: extract_isosurface and simplify it"
-    )
+def obstacle(options: Options) -> str | None:
+    """Why a surface cannot be simplified with these options before all of it is there, if so."""
+    for name in ("target_faces", "keep_ratio"):
+        if getattr(options, name) is not None:
+            return f"{name} needs the whole surface, to tell which edges are the cheapest"
+    if options.max_error is not None:
+        return "max_error needs the whole surface, to compare the result with"
+    if options.intersections != "allow":
+        return "intersections='prevent' needs the whole surface, to tell what comes to cross"
+    if options.uses_quadrics:
+        return "quadrics need the whole surface, to stand for all that was merged"
+    if options.blocked == "violate":
+        return "parts can only be joined when the topology is kept, not with blocked='violate'"
+    return None
 
 
 def block_ends(shape: tuple[int, int, int]) -> list[int]:
