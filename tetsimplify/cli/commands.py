@@ -310,8 +310,12 @@ def simplify(
         )
         volume_options = {"lattice": lattice, "normals": normals, "closed": closed or None}
         chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
-        mesh = _read(this, source, level, chosen, spacing, volume_options)
-        result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
+        result = None
+        if is_volume_file(source) and level is not None and not repair:
+            result = _stream(this, source, level, chosen, spacing, volume_options, wanted, threads)
+        if result is None:
+            mesh = _read(this, source, level, chosen, spacing, volume_options)
+            result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
         _write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
             {
@@ -504,6 +508,42 @@ def _extract(
             f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
         )
     return mesh
+
+
+def _stream(
+    this: Session,
+    path: Path,
+    level: float,
+    chosen: dict[str, Any],
+    spacing: str | None,
+    volume_options: dict[str, Any],
+    wanted: Wanted,
+    threads: int | None,
+) -> Any:
+    """Simplify the surface of a volume while it is extracted; None where all of it is needed."""
+    from tetsimplify.io.simplified import has_right_angles, simplified_isosurface_of
+
+    options = wanted.streamed()
+    if options is None:
+        return None
+    distances = None if spacing is None else values.parse_spacing(spacing)
+    with this.stage("read"):
+        volume: Volume = read_volume(path, **chosen)
+    if distances is not None:
+        volume = volume.with_spacing(distances)
+    if not has_right_angles(volume):
+        return None
+    options |= {name: value for name, value in volume_options.items() if value is not None}
+    result = simplified_isosurface_of(
+        volume, level, threads=threads, progress=this.progress, **options
+    )
+    this.seconds.update(result.report.seconds)
+    if not len(result.faces):
+        low, high = volume.value_range()
+        raise VolumeError(
+            f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
+        )
+    return result
 
 
 def _simplify(this: Session, mesh: Mesh, **options: Any) -> Any:

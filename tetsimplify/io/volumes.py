@@ -195,12 +195,13 @@ def isosurface_of(
     mesh = extract_isosurface(
         data, level, lattice=lattice, closed=closed, normals=normals, progress=progress
     )
-    vertices = _to_world(mesh.vertices, affine)
+    vertices = to_world(mesh.vertices, affine)
     mirrors = np.linalg.det(affine[:3, :3]) < 0
     return Mesh(vertices, np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrors else mesh.faces)
 
 
-def _to_world(points: NDArray[np.float64], affine: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_world(points: NDArray[np.float64], affine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a grid, shape (n, 3), in the world; the same bytes on every machine."""
     # Spelled out, since a matrix product adds up in another order on another machine.
     world = np.empty_like(points)
     for axis in range(3):
