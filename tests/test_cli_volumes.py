@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tetsimplify import surface_distance
 from tetsimplify.cli import app
-from tetsimplify.io import Volume, isosurface_of, read_mesh
-from volumes import ball
+from tetsimplify.io import Volume, isosurface_of, read_mesh, read_volume
+from volumes import ball, signed_volume
 
 
 @pytest.fixture
@@ -203,3 +204,58 @@ def test_no_label_but_background(run, tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((3, 3, 3), int))
     result, _ = run("isosurface", tmp_path / "a.npy", "--labels", "all", exit_code=1)
     assert "there is no label in" in result["error"]["message"]
+
+
+AXES = np.array([[0.0, -0.6, 0.8], [0.0, 0.8, 0.6], [1.0, 0.0, 0.0]])  # upright, mirrored
+
+
+def placed(axes):
+    affine = np.eye(4)
+    affine[:3, :3] = axes * (0.5, 0.5, 1.0)
+    affine[:3, 3] = 7.0, -3.0, 2.0
+    return affine
+
+
+@pytest.fixture
+def upright(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    path = tmp_path / "upright.nii"
+    nibabel.Nifti1Image(ball().astype(np.float32), placed(AXES)).to_filename(path)
+    return path
+
+
+def test_a_volume_is_simplified_while_it_is_extracted(run, upright):
+    command = ("simplify", upright, "--level", 0, "--max-edge-length")
+    streamed, target = run(*command, 0.6)
+    assert "stream" in streamed["seconds"]
+    assert "extract" not in streamed["seconds"]
+    mesh = read_mesh(target)
+    volume = read_volume(upright)
+    whole = isosurface_of(volume, 0.0)
+    assert streamed["topology_before"]["n_faces"] == len(whole.faces)
+    assert streamed["same_topology"]
+    assert streamed["remaining"] == {}
+    assert signed_volume(mesh) == pytest.approx(signed_volume(whole), rel=0.05)
+    assert surface_distance(mesh, whole).upper < 0.5
+    for other in (("140%",), (1.0, "--repair"), (1.0, "--target-faces", 100)):
+        result, _ = run(*command, *other)
+        assert "stream" not in result["seconds"]
+        assert result["same_topology"]
+
+
+def test_a_skewed_volume_is_simplified_as_a_whole(run, tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    skewed = placed(AXES + [[0.2, 0, 0], [0, 0, 0], [0, 0, 0]])
+    image = nibabel.Nifti1Image(ball().astype(np.float32), None)
+    image.set_sform(skewed)
+    image.to_filename(tmp_path / "skewed.nii")
+    command = ("simplify", tmp_path / "skewed.nii", "--level", 0, "--max-edge-length", 1.0)
+    result, _ = run(*command)
+    assert "stream" not in result["seconds"]
+    assert result["same_topology"]
+
+
+def test_range_is_told_while_streaming(run, upright):
+    command = ("simplify", upright, "--level", 99, "--max-edge-length", 1.0)
+    result, _ = run(*command, exit_code=1)
+    assert "nothing crosses the level 99" in result["error"]["message"]

@@ -18,6 +18,7 @@ from tetsimplify.quality import QualityReport, quality
 from tetsimplify.repair import repair
 from tetsimplify.report import RepairReport, Simplification, SimplificationReport
 from tetsimplify.simplify import simplify
+from tetsimplify.streaming import SimplifiedIsosurface, extract_and_simplify
 from tetsimplify.topology import TopologyReport, topology
 
 __version__ = "0.1.0"
@@ -36,11 +37,13 @@ __all__ = [
     "RepairReport",
     "Simplification",
     "SimplificationReport",
+    "SimplifiedIsosurface",
     "SurfaceDistance",
     "TetsimplifyError",
     "TopologyReport",
     "VolumeError",
     "compare",
+    "extract_and_simplify",
     "extract_interfaces",
     "extract_isosurface",
     "quality",

@@ -79,7 +79,8 @@ class Engine:
     mesh : Mesh
         Checked arrays; they are copied.
     options : Options
-    locked : ndarray, shape (n,), bool
+    locked : ndarray, shape (n,), bool or uint8
+        Vertices that stay; 2 where they are not merged with others either.
     bound : ndarray, shape (n,), float64, optional
         Largest quadric error that each vertex may come to, instead of that of the options.
     threads : int, optional
@@ -91,6 +92,8 @@ class Engine:
     n_threads : int
     min_faces : int
         So many faces are to be left.
+    is_part : bool
+        Whether this is a part of a surface, of which nothing need be told.
 
     Raises
     ------
@@ -102,7 +105,7 @@ class Engine:
         self,
         mesh: Mesh,
         options: Options,
-        locked: NDArray[np.bool_],
+        locked: NDArray[np.bool_] | NDArray[np.uint8],
         bound: NDArray[np.float64] | None = None,
         threads: int | None = None,
     ) -> None:
@@ -126,6 +129,7 @@ class Engine:
         self.options, self.rules = options, options.rules()
         self._outer = options.outer_code()
         self.min_faces = options.fewest_faces(m)
+        self.is_part = False
         self.n_sweeps = 0
         self._watch = self._new_watch()
         n_coned = n + self.topology_before.n_boundary_loops
@@ -475,7 +479,7 @@ class Engine:
     def _remaining_edges(self) -> tuple[NDArray[np.int32], NDArray[np.str_]]:
         """The short edges that are left, and the reasons found when they were last tried."""
         surface, state = self._surface, kernels.state
-        if self.options.max_edge_length is None:
+        if self.options.max_edge_length is None or self.is_part:
             return np.empty((0, 2), np.int32), np.empty(0, np.str_)
         is_open = surface.corner_vertex[::3] != kernels.corners.DEAD
         if self._cost is None:

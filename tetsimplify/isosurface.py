@@ -207,22 +207,12 @@ def extract_isosurface(
             threads=threads,
             progress=progress,
         )
-    has_centres = lattice_named(lattice).has_centres
     limit = as_foldover(foldover)
-    frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
-    source: Any = volume
-    if callable(volume) and not hasattr(volume, "shape"):
-        source, frame = _as_samples(volume, bounds, shape, frame)
-        if has_centres and centres is None:
-            centres = source.centres()
-    elif bounds is not None or shape is not None:
-        raise OptionError("bounds and shape are for functions; a volume has spacing and origin")
-    samples = as_volume(source)
-    middles = _as_centres(centres, samples.shape, lattice)
+    samples, middles, frame = as_source(volume, bounds, shape, spacing, origin, lattice, centres)
     fields = as_fields(vertex_data, samples.shape, vertex_normals)
     above = _is_lower(normals)
     factor = as_factor(refine)
-    if factor > 1 and (source is not volume or middles is not None):
+    if factor > 1 and (is_function(volume) or middles is not None):
         raise OptionError("refine is for samples alone: a function has a shape, centres stay")
 
     with Workers(threads) as workers:
@@ -260,6 +250,35 @@ def _finished(march: March, data: dict[str, Rows], cos_foldover: float | None) -
     if cos_foldover is not None:
         faces, rows = regular(faces, rows, march, cos_foldover)
     return Isosurface(rows.pop(""), faces, march.level, rows)
+
+
+def is_function(volume: Any) -> bool:
+    """Whether this is to be sampled, instead of samples."""
+    return callable(volume) and not hasattr(volume, "shape")
+
+
+def as_source(
+    volume: Any,
+    bounds: Any,
+    shape: Any,
+    spacing: Any,
+    origin: Any,
+    lattice: str,
+    centres: Any,
+) -> tuple[Any, Planes | None, NDArray[np.float64]]:
+    """Check what is to be marched over: samples, centres where given, and spacing and origin."""
+    has_centres = lattice_named(lattice).has_centres
+    frame = np.array([as_triple("spacing", spacing, positive=True), as_triple("origin", origin)])
+    source: Any = volume
+    if is_function(volume):
+        source, frame = _as_samples(volume, bounds, shape, frame)
+        if has_centres and centres is None:
+            centres = source.centres()
+    elif bounds is not None or shape is not None:
+        raise OptionError("bounds and shape are for functions; a volume has spacing and origin")
+    samples = as_volume(source)
+    middles = _as_centres(centres, samples.shape, lattice)
+    return samples, middles, frame
 
 
 def _as_samples(

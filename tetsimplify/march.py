@@ -8,7 +8,7 @@ triangles themselves. So the result is the same however it is divided.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -27,6 +27,20 @@ BYTES_IN_PLACE = 2**32  # the same where nothing is copied, so that the result c
 LEAST_PLANES_AT_ONCE = 4
 LEAST_SAMPLES_OF_SLAB = 2**15  # below that a thread takes longer to wake up than to work
 GROWTH = 1.25  # of the arrays of the result: at most a quarter of them is to spare
+LIKELY = 1.25  # times as many rows as if the other planes were like those before
+MOST_ROOM = 16  # times the rows that there are is made at once
+
+
+class Raw(NamedTuple):
+    """The surface of a block as a mesh of its own, complete but for what lies around its planes."""
+
+    vertices: NDArray[np.float64]
+    """Shape (n, 3): those of the block, and then those of the next plane."""
+    faces: NDArray[np.int32]
+    n_below: int
+    """So many of the first vertices are the last ones of the block before, in the same order."""
+    n_above: int
+    """So many of the last vertices are the first ones of the next block."""
 
 
 class Block(NamedTuple):
@@ -45,18 +59,25 @@ class Block(NamedTuple):
 
 
 def blocks(
-    volume: Planes, centres: Planes | None, tables: Tables, workers: Workers, n_before: int = 0
+    volume: Planes,
+    centres: Planes | None,
+    tables: Tables,
+    workers: Workers,
+    n_before: int = 0,
+    ends: Sequence[int] | None = None,
 ) -> Iterator[Block]:
     """Read a volume block by block, with so many planes before each.
 
-    The planes that are read for a block end where those of a chunk end, if these are not too many.
+    Blocks end before the planes `ends`. If none are given, the planes that are read for a block end
+    where those of a chunk end, if these are not too many.
     """
     n_planes, n1, n2 = volume.shape
-    n_bytes = BYTES_IN_PLACE if volume.is_in_place else BYTES_AT_ONCE
-    at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (8 * n1 * n2))
-    at_once -= at_once % volume.planes_of_chunk if volume.planes_of_chunk < at_once else 0
     n_more = 3 if tables.has_centres else 2
-    ends = [*range(at_once - n_more, n_planes - n_more, at_once), n_planes]
+    if ends is None:
+        n_bytes = BYTES_IN_PLACE if volume.is_in_place else BYTES_AT_ONCE
+        at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (8 * n1 * n2))
+        at_once -= at_once % volume.planes_of_chunk if volume.planes_of_chunk < at_once else 0
+        ends = [*range(at_once - n_more, n_planes - n_more, at_once), n_planes]
     for begin, end in pairwise([0, *ends]):
         first, last = max(begin - n_before, 0), min(end + n_more, n_planes)
         samples = volume.take(first, last, workers)
@@ -99,7 +120,7 @@ class March:
         if n1 * n2 > MAX_CORNERS:
             raise VolumeError(f"planes of {n1} x {n2} samples are too large")
         self.level, self.above, self.frame, self.tables = level, above, frame, tables
-        self.shape = volume.shape
+        self.volume, self.shape = volume, volume.shape
         self._colours = _Colours(volume, level, above, tables.has_centres, workers)
         self._workers, self._traced = workers, traced
         self._numbers_shape = (2, n1 * n2)
@@ -108,26 +129,46 @@ class March:
         self.faces = Rows(np.int32, 3)
         self.edges = Rows(np.int64)
         self.ratios = Rows(np.float64)
+        self._n_shared = 0
 
     def add(self, block: Block, tell: Callable[[float], object]) -> slice:
         """Take the next block; return which vertices are new.
 
         `tell` is called with the part of the block that is done, from 0 to 1.
         """
+        return self._add(block, self._colours.window(block), tell)
+
+    def take(self, block: Block) -> Raw:
+        """Take the next block, and hand over its surface instead of adding it to what there is."""
         window = self._colours.window(block)
+        is_last = block.end == block.n_planes
+        n_above = 0 if is_last else self._count(window, (block.end, block.end + 1))[0]
+        self._add(block, window, lambda done: None, n_above)
+        raw = Raw(self.vertices.finish(), self.faces.finish(), self._n_shared, n_above)
+        self.vertices, self.faces = Rows(np.float64, 3), Rows(np.int32, 3)
+        self._n_shared = n_above
+        return raw
+
+    def _add(
+        self, block: Block, window: Any, tell: Callable[[float], object], n_above: int = 0
+    ) -> slice:
         slabs = self._workers.parts(block.begin, block.end, self._colours.least_planes)
         counts = np.array(self._workers.map(lambda slab: self._count(window, slab), slabs))
         before = self.vertices.n_rows, self.faces.n_rows
         ends = np.cumsum(counts, axis=0) + before
+        ends[-1, 0] += n_above  # which the last slab places, too
+        counts[-1, 0] += n_above
         n_vertices, n_faces = ends[-1].tolist()
         for n, name in ((n_vertices, "vertices"), (3 * n_faces, "face corners")):
             if n > MAX_CORNERS:
                 raise VolumeError(f"the surface has more than {MAX_CORNERS:,} {name}")
-        self.vertices.extend(n_vertices)
-        self.faces.extend(n_faces)
+        growth = LIKELY * block.n_planes / block.end if block.end < block.n_planes else 1.0
+        of_vertices = n_vertices, int(growth * n_vertices)
+        self.vertices.extend(*of_vertices)
+        self.faces.extend(n_faces, int(growth * n_faces))
         if self._traced:
-            self.edges.extend(n_vertices)
-            self.ratios.extend(n_vertices)
+            self.edges.extend(*of_vertices)
+            self.ratios.extend(*of_vertices)
         begins = ends - counts
         filled = self._workers.each(
             lambda k: self._fill(window, slabs[k], begins[k].tolist(), ends[k].tolist()),
@@ -232,8 +273,9 @@ def _moved(bits: NDArray[np.uint32], by: int, n_known: int, n: int) -> NDArray[n
 class Rows:
     """Numbers, or rows of numbers, that are added to, in an array that grows in place.
 
-    Where the system can map a large block of memory elsewhere nothing is copied, and nothing is
-    ever there twice.
+    Memory that is not written to costs nothing, so room is made for all rows that are likely. Where
+    they come to be more, and the system can map a large block of memory elsewhere, nothing is
+    copied; but what is new there is filled with zeros, which takes time.
     """
 
     def __init__(self, dtype: type, *shape: int) -> None:
@@ -245,10 +287,16 @@ class Rows:
         """A view of all rows, to be let go of before more are added."""
         return self._rows[: self.n_rows]
 
-    def extend(self, n_rows: int) -> None:
-        """Make room for so many rows in all."""
+    def extend(self, n_rows: int, n_likely: int = 0) -> None:
+        """Make room for so many rows in all, and at once for as many as it is likely to be."""
         if n_rows > len(self._rows):
-            self._resize(max(n_rows, int(GROWTH * len(self._rows))))
+            n_likely = min(n_likely, MOST_ROOM * n_rows)
+            if n_likely > 2 * len(self._rows):
+                rows = np.empty((max(n_rows, n_likely), *self._rows.shape[1:]), self._rows.dtype)
+                rows[: self.n_rows] = self.rows
+                self._rows = rows
+            else:
+                self._resize(max(n_rows, int(GROWTH * len(self._rows))))
         self.n_rows = n_rows
 
     def finish(self) -> NDArray[Any]:

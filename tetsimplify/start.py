@@ -32,7 +32,7 @@ def start_surface(
     given: Mesh,
     arranged: Arrangement,
     options: Options,
-    locked: NDArray[np.bool_],
+    locked: NDArray[np.bool_] | NDArray[np.uint8],
     threads: int | None = None,
 ) -> tuple[Surface, TopologyReport, NDArray[np.int32]]:
     """The corner table of a mesh, its topology, and a corner of each vertex.
@@ -43,8 +43,8 @@ def start_surface(
     arranged : Arrangement
         The same in another order. Its arrays are used, not copied.
     options : Options
-    locked : ndarray, shape (n,), bool
-        In the order given.
+    locked : ndarray, shape (n,), bool or uint8
+        In the order given. 2 where edges may not be contracted either.
     threads : int, optional
         How many threads to use.
 
@@ -78,7 +78,7 @@ def start_surface(
         loop=loop,
         loop_size=np.zeros(n_loops, np.int32),
         loop_home=np.zeros(n_loops, np.int32),
-        locked=locked[arranged.vertex_origin] | held,
+        locked=np.maximum(locked[arranged.vertex_origin], held).astype(np.uint8),
         merges=np.empty((n, 2)),
     )
     kernels.loops.count_loop_edges(surface.loop, surface.merged_into, surface.loop_size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import pairwise
 from types import TracebackType
 from typing import TypeVar
@@ -13,7 +13,7 @@ from tetsimplify.crew import Crew
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-PARTS_A_THREAD = 4  # so that threads that are done early take what is left
+PARTS_A_THREAD = 2  # so that threads that are done early take what is left
 LARGEST_PART = 32
 
 
@@ -26,6 +26,10 @@ class Workers:
         How many; None for all cores that the process may use. With one, everything is done in
         the thread of the caller.
 
+    Attributes
+    ----------
+    n_threads : int
+
     Raises
     ------
     OptionError
@@ -33,7 +37,7 @@ class Workers:
     """
 
     def __init__(self, threads: int | None) -> None:
-        self._threads = Crew(threads).n_threads
+        self.n_threads = Crew(threads).n_threads
         self._pool: ThreadPoolExecutor | None = None
 
     def __enter__(self) -> Workers:
@@ -54,16 +58,27 @@ class Workers:
 
     def each(self, task: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
         """What comes of each item as soon as it and those before it are done."""
-        if self._threads == 1 or len(items) == 1:
+        if self.n_threads == 1 or len(items) == 1:
             return map(task, items)
+        return self._started().map(task, items)
+
+    def submit(self, task: Callable[[], Result]) -> Future[Result]:
+        """Begin with a task, after those that were submitted before; with one thread, do it."""
+        if self.n_threads == 1:
+            done: Future[Result] = Future()
+            done.set_result(task())
+            return done
+        return self._started().submit(task)
+
+    def _started(self) -> ThreadPoolExecutor:
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self._threads)
-        return self._pool.map(task, items)
+            self._pool = ThreadPoolExecutor(self.n_threads)
+        return self._pool
 
     def parts(self, begin: int, end: int, least: int = 1) -> list[tuple[int, int]]:
         """Cut a range into parts of about the same length, of at least so many items."""
         n_items = end - begin
-        n_parts = PARTS_A_THREAD * self._threads if self._threads > 1 else 1
+        n_parts = PARTS_A_THREAD * self.n_threads if self.n_threads > 1 else 1
         n_parts = min(max(n_parts, -(-n_items // LARGEST_PART)), max(1, n_items // least))
         bounds = [begin + n_items * k // n_parts for k in range(n_parts + 1)]
         return list(pairwise(bounds))

@@ -38,7 +38,9 @@ from tetsimplify.cli.volumes import (
     Spacing,
     Time,
     extract,
+    nothing_crosses,
     one_level,
+    opened,
 )
 from tetsimplify.cli.wanted import Wanted, diagonal, median_edge
 from tetsimplify.edges import edge_lengths
@@ -249,8 +251,12 @@ def simplify(
             "regularise": regularise or None,
         }
         chosen = {"key": key, "channel": channel, "time": time, "axes": axes}
-        mesh = _read(this, source, level, chosen, spacing, volume_options)
-        result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
+        result = None
+        if is_volume_file(source) and level and not repair:
+            result = _stream(this, source, level, chosen, spacing, volume_options, wanted, threads)
+        if result is None:
+            mesh = _read(this, source, level, chosen, spacing, volume_options)
+            result = _simplify(this, mesh, repair=repair, threads=threads, **wanted.options(mesh))
         write(this, output, Mesh(result.vertices, result.faces))
         this.finish(
             {
@@ -411,6 +417,36 @@ def _read(
         raise OptionError(f"{', '.join(wrong)}: only for volumes, and {source} is a mesh")
     with this.stage("read"):
         return read_mesh(source)
+
+
+def _stream(
+    this: Session,
+    path: Path,
+    level: list[str],
+    chosen: dict[str, Any],
+    spacing: str | None,
+    volume_options: dict[str, Any],
+    wanted: Wanted,
+    threads: int | None,
+) -> Any:
+    """Simplify the surface of a volume while it is extracted; None where all of it is needed."""
+    from tetsimplify.io.simplified import has_right_angles, simplified_isosurface_of
+
+    options = wanted.streamed()
+    given = {name: value for name, value in volume_options.items() if value is not None}
+    if options is None or given.keys() & {"refine", "regularise"}:
+        return None
+    number = one_level(level)
+    volume = opened(this, path, chosen, spacing)
+    if not has_right_angles(volume):
+        return None
+    result = simplified_isosurface_of(
+        volume, number, threads=threads, progress=this.progress, **options, **given
+    )
+    this.seconds.update(result.report.seconds)
+    if not len(result.faces):
+        raise nothing_crosses(result.level, path, volume)
+    return result
 
 
 def _simplify(this: Session, mesh: Mesh, **options: Any) -> Any:

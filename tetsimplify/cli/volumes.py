@@ -107,6 +107,14 @@ def opened(
     return volume if distances is None else volume.with_spacing(distances)
 
 
+def nothing_crosses(level: float, path: Path, volume: Volume) -> VolumeError:
+    """What to say where a surface has no faces."""
+    low, high = volume.value_range()
+    return VolumeError(
+        f"nothing crosses the level {level:g}: the values of {path} go from {low} to {high}"
+    )
+
+
 def extract(
     this: Session,
     path: Path,
@@ -124,11 +132,7 @@ def extract(
             continue
         if "labels" in given:
             raise VolumeError(f"there is no label {surface.label} in {path}")
-        low, high = volume.value_range()
-        raise VolumeError(
-            f"nothing crosses the level {surface.level:g}: the values of {path} go from {low} to "
-            f"{high}"
-        )
+        raise nothing_crosses(surface.level, path, volume)
     if not found:
         raise VolumeError(f"there is no label in {path}, all is background")
     return found

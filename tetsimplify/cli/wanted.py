@@ -72,6 +72,16 @@ class Wanted:
         }
         Options(**self._with({name: number for name, (number, _) in self._lengths.items()}))
 
+    def streamed(self) -> dict[str, Any] | None:
+        """The options if they do for a surface that is not there as a whole, None if not."""
+        from tetsimplify.options import Options
+        from tetsimplify.streaming import obstacle
+
+        if any(is_relative for _, is_relative in self._lengths.values()):
+            return None  # to edges that are not known yet
+        options = self._with({name: number for name, (number, _) in self._lengths.items()})
+        return options if obstacle(Options(**options)) is None else None
+
     def options(self, mesh: Mesh) -> dict[str, Any]:
         """The options for a mesh."""
         lengths = {

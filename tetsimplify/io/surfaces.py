@@ -100,7 +100,7 @@ class _Placed:
         """The same surface, in the world."""
         from tetsimplify.isosurface import Isosurface
 
-        vertices, faces = self._points(surface.vertices), surface.faces
+        vertices, faces = to_world(surface.vertices, self._affine), surface.faces
         if self._mirrors:
             faces = np.ascontiguousarray(faces[:, ::-1])
         if not isinstance(surface, Isosurface):
@@ -109,16 +109,6 @@ class _Placed:
         if NORMALS in data:
             data[NORMALS] = self._normals(data[NORMALS])
         return Isosurface(vertices, faces, surface.level, data)
-
-    def _points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        # Spelled out, since a matrix product adds up in another order on another machine.
-        world = np.empty_like(points)
-        for axis in range(3):
-            world[:, axis] = self._affine[axis, 3]
-            for index in range(3):
-                if self._affine[axis, index]:
-                    world[:, axis] += self._affine[axis, index] * points[:, index]
-        return world
 
     def _normals(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gradients go the other way than points: by the transpose of the inverse."""
@@ -129,3 +119,15 @@ class _Placed:
                 world[:, axis] += inverse[index, axis] * normals[:, index]
         lengths = np.linalg.norm(world, axis=1, keepdims=True)
         return np.divide(world, lengths, where=lengths > 0, out=world)
+
+
+def to_world(points: NDArray[np.float64], affine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a grid, shape (n, 3), in the world; the same bytes on every machine."""
+    # Spelled out, since a matrix product adds up in another order on another machine.
+    world = np.empty_like(points)
+    for axis in range(3):
+        world[:, axis] = affine[axis, 3]
+        for index in range(3):
+            if affine[axis, index]:
+                world[:, axis] += affine[axis, index] * points[:, index]
+    return world

@@ -59,7 +59,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     block = scratch.tally[BLOCK]
     if surface.vertex_block[v] != block or surface.vertex_block[u] != block:
         return OUTSIDE
-    if surface.locked[v] and surface.locked[u]:
+    if surface.locked[v] + surface.locked[u] > 1:
         return LOCKED
     n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)
     if rules.blocked != VIOLATE:
@@ -94,7 +94,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
     """
     v = surface.corner_vertex[corner]
     u = surface.corner_vertex[ahead(corner)]
-    if surface.locked[v] and surface.locked[u]:
+    if surface.locked[v] + surface.locked[u] > 1:
         return LOCKED
     lens = keep_one_lens(surface, scratch, rules, outer, corner)
     if lens.outcome != CONTRACTIBLE:
@@ -177,7 +177,7 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
     n_merges = scratch.tally[N_SIMPLE] + scratch.tally[N_NESTED]
     surface.merges[n_merges, 0] = u
     surface.merges[n_merges, 1] = scratch.point[PLACE]
-    surface.locked[v] |= surface.locked[u]
+    surface.locked[v] = max(surface.locked[v], surface.locked[u])
     surface.loop[v] = max(surface.loop[v], surface.loop[u])
 
     star, n = lists[STAR], n_v + n_u

@@ -52,7 +52,7 @@ def _ranked_cost(surface, quadrics, rules, a, b):
     length2 = squared_length(vertices, a, b)
     if length2 >= rules.max_length2:
         return np.inf, CONTRACTIBLE
-    if surface.locked[a] and surface.locked[b]:
+    if surface.locked[a] + surface.locked[b] > 1:
         return np.inf, LOCKED
     if quadrics is None:
         return length2, CONTRACTIBLE

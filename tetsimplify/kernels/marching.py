@@ -306,7 +306,8 @@ def fill_slab(window, tables, z0, z1, start, frame, numbers, active, out):
     active : int32 (2, n2)
         Scratch space.
     out : Output
-        As long as was counted.
+        As long as was counted; or with room for the vertices of plane z1 too, which are placed
+        then.
     """
     n1, n2 = window.samples.shape[1:]
     n_vertices = 0
@@ -323,7 +324,7 @@ def fill_slab(window, tables, z0, z1, start, frame, numbers, active, out):
                 if slots == 0:
                     continue
                 numbers[z & 1, y * n2 + x] = (start + n_vertices) << WORD | slots
-                if plane < z1:
+                if n_vertices < len(out.vertices):
                     _place_vertices(window, tables, z, y, x, slots, n_vertices, frame, out)
                 n_vertices += n_bits(slots)
         if plane == z0:

@@ -45,7 +45,8 @@ class Surface(NamedTuple):
     loop: np.ndarray  # int32 (n,): boundary loop of the vertex, -1 inside
     loop_size: np.ndarray  # int32 (n_loops,): edges of each boundary loop
     loop_home: np.ndarray  # int32 (n_loops,): block that has all faces at it, or SHARED
-    locked: np.ndarray  # bool (n,): the vertex may neither move nor vanish
+    locked: np.ndarray  # uint8 (n,): 1 where the vertex may neither move nor vanish, 2 where its
+    # edges may not be contracted either
     merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
 
 
