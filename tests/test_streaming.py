@@ -162,7 +162,7 @@ def test_options_reach_every_block(options, thin_blocks):
 
 @pytest.mark.parametrize("length", [1.5, 2.5])
 def test_no_dense_seams(length, thin_blocks, monkeypatch):
-    """Edges are as long, and vertices as many, where blocks met as elsewhere, and as in one piece."""
+    """Edges are as long, and vertices as many, where blocks met as elsewhere or in one piece."""
     monkeypatch.setattr("tetsimplify.blocks.RUN", 2**40)
     volume = gyroid(96)
     thin_blocks(12)

@@ -133,7 +133,7 @@ def extract_and_simplify(
     Examples
     --------
     >>> import tetsimplify
-    >>> tube = lambda x, y, z: 0.3 - ((x**2 + y**2) ** 0.5 - 0.6) ** 2 - z**2
+    >>> tube = lambda x, y, z: 0.1 - ((x**2 + y**2) ** 0.5 - 0.6) ** 2 - z**2
     >>> result = tetsimplify.extract_and_simplify(
     ...     tube, 0.0, bounds=[(-1.5, 1.5)] * 3, shape=60, max_edge_length=0.1
     ... )
