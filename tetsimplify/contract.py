@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify.crew import Crew
+from tetsimplify.edges import edge_extremes
 from tetsimplify.engine import Engine
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress
@@ -50,7 +51,7 @@ def contract(
     """Contract edges of a mesh that an engine is made of; see :func:`tetsimplify.simplify`."""
     options = engine.options
     with clock.stage("check"):
-        shortest_before, _ = kernels.result.edge_extremes(mesh.vertices, mesh.faces.reshape(-1))
+        shortest_before, _ = edge_extremes(mesh, Crew(engine.n_threads))
 
     with clock.stage("contract"):
         n_rounds = 1

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tetsimplify import kernels
+from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
+
+AT_ONCE = 2**17  # faces in a task for a thread
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
@@ -27,3 +31,18 @@ def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
     keys = np.minimum(a, b) * len(mesh.vertices) + np.maximum(a, b)
     low, high = np.divmod(np.unique(keys[a != b]), max(len(mesh.vertices), 1))
     return np.linalg.norm(mesh.vertices[low] - mesh.vertices[high], axis=1)
+
+
+def edge_extremes(mesh: Mesh, crew: Crew) -> tuple[float, float]:
+    """Lengths of the shortest and of the longest edge; infinite and 0 when there is none."""
+
+    def find(part: slice) -> tuple[float, float]:
+        shortest, longest = kernels.result.edge_extremes(
+            mesh.vertices, mesh.faces[part].reshape(-1)
+        )
+        return float(shortest), float(longest)
+
+    found = crew.share(find, len(mesh.faces), AT_ONCE)
+    return min((pair[0] for pair in found), default=np.inf), max(
+        (pair[1] for pair in found), default=0.0
+    )

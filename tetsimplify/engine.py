@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tetsimplify import blocks, kernels
 from tetsimplify.crew import Crew
 from tetsimplify.data import VertexWeights
+from tetsimplify.edges import edge_extremes
 from tetsimplify.locality import Arrangement, as_given, by_locality
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
@@ -425,7 +426,7 @@ class Engine:
     def result(self) -> Result:
         """The live part, renumbered in the order given, and what is left in it. Ends the run."""
         edges, reasons = self._remaining_edges()
-        self._compact()
+        self._compact(is_last=True)
         surface, place = self._surface, self._arranged.vertex_place
         order = self._order_given()
         faces = surface.corner_vertex.reshape(-1, 3)[order].copy()
@@ -436,7 +437,7 @@ class Engine:
         kernels.result.copy_vertices(
             surface.vertices, number, merged_into, faces.reshape(-1), vertices
         )
-        shortest, longest = kernels.result.edge_extremes(vertices, faces.reshape(-1))
+        shortest, longest = edge_extremes(Mesh(vertices, faces), self._crew)
         stop = self._stop(reasons, longest)
         return Result(
             *(vertices, faces, number[place], self._face_origin[order], number[edges], reasons),
@@ -534,8 +535,8 @@ class Engine:
             self._compact()
             self._watch = self._new_watch()
 
-    def _compact(self) -> None:
-        """Drop the dead faces."""
+    def _compact(self, *, is_last: bool = False) -> None:
+        """Drop the dead faces. Corners are not linked anew when nothing is contracted any more."""
         surface, crew, m = self._surface, self._crew, len(self._face_origin)
         counts = crew.share(self._count_live, m, blocks.PART)
         begin = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
@@ -553,9 +554,11 @@ class Engine:
             )
 
         crew.share(copy, m, blocks.PART)
-        if self._cells is not None:
+        if self._cells is not None and not is_last:
             self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
-        next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
+        next_corner = surface.next_corner
+        if not is_last:
+            next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
         self._cost, self._face_origin = cost, origin
         self._listed = np.arange(n_live, dtype=np.int32)
         self._surface = surface._replace(
