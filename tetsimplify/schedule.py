@@ -17,7 +17,7 @@ from tetsimplify.engine import Engine
 from tetsimplify.options import Progress
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-SHARES = (0.15, 0.02)  # of the edges are below the next threshold; the second near the end
+SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
 NEAR_END = 2.0  # times the faces asked for are left
 LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: triangles that become
 LENIENT = 4.0  # worse have time to become better again
