@@ -585,3 +585,13 @@ def test_empty_and_tiny_meshes(mesh, cost):
 def test_wrong_options(options, message):
     with pytest.raises(tetsimplify.OptionError, match=message):
         tetsimplify.simplify(*meshes.octahedron(), **options)
+
+
+@pytest.mark.parametrize("scale", [2.0**-40, 2.0**60])
+def test_the_unit_of_length_makes_no_difference(scale):
+    """Nor for nanometres in metres, though b and c are kept in single precision."""
+    vertices, faces = torus()
+    expected = tetsimplify.simplify(vertices, faces, keep_ratio=0.2)
+    result = tetsimplify.simplify(scale * vertices, faces, keep_ratio=0.2)
+    assert np.array_equal(result.faces, expected.faces)
+    assert np.array_equal(result.vertices, scale * expected.vertices)
