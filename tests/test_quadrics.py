@@ -162,7 +162,7 @@ def test_errors_of_the_result_are_those_of_the_planes_merged():
         assert engine.tally("N_NESTED") == 0
         expected = naive_quadrics.rms_errors(vertices, faces, engine.result)
         assert expected.max() > 0.01
-        assert np.allclose(engine.result.vertex_errors, expected, rtol=1e-4, atol=1e-4)
+        assert np.allclose(engine.result.vertex_errors, expected, rtol=1e-4, atol=1e-6)
 
 
 # --- topology, in every mode ----------------------------------------------------------------------
@@ -538,9 +538,9 @@ def test_data_are_carried():
 def test_progress_rises_to_the_end_and_can_cancel():
     calls = []
     mesh = torus()
-    tetsimplify.simplify(*mesh, keep_ratio=0.2, progress=lambda _, done: calls.append(done))
+    tetsimplify.simplify(*mesh, keep_ratio=0.05, progress=lambda _, done: calls.append(done))
     assert calls == sorted(calls)
-    assert len(calls) > 3 and calls[-1] == 1.0
+    assert len(calls) > 5 and calls[-1] == 1.0
 
     def cancel(stage, done):
         raise KeyboardInterrupt

@@ -429,7 +429,7 @@ class Engine:
         self._compact(is_last=True)
         surface, place = self._surface, self._arranged.vertex_place
         order = self._order_given()
-        faces = surface.corner_vertex.reshape(-1, 3)[order].copy()
+        faces = surface.corner_vertex.reshape(-1, 3)[order]
         number = np.empty(len(surface.merged_into), np.int32)
         merged_into = surface.merged_into.copy()  # whose paths are shortened
         n_used = kernels.result.number_vertices(surface.corner_vertex, place, merged_into, number)
@@ -444,11 +444,11 @@ class Engine:
             *(shortest, stop, self._vertex_errors(number)),
         )
 
-    def _order_given(self) -> NDArray[np.int32] | slice:
+    def _order_given(self) -> NDArray[np.int32]:
         """The live faces in the order in which they were given."""
         origin = self._face_origin
         if self._arranged.is_as_given:
-            return slice(None)
+            return np.arange(len(origin), dtype=np.int32)
         place = np.full(len(self._arranged.face_origin), -1, np.int32)
         place[origin] = np.arange(len(origin), dtype=np.int32)
         return place[place >= 0]

@@ -1,16 +1,9 @@
 """Blocks of faces, made of cells: pieces of the surface that were numbered along a curve."""
 
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.jit import kernel_in_place
 
 SHARED = -1  # no block has all faces of the vertex
-UNSEEN = -2  # no face of the vertex yet
-
-
-@part
-def joined(known, block):
-    """The block of what is known to be in one and is in another one, too."""
-    return block if known == UNSEEN or known == block else SHARED
 
 
 @kernel_in_place

@@ -1,7 +1,9 @@
 """Boundary loops: how many edges each has, and which block of faces has all that touches it."""
 
-from tetsimplify.kernels.blocks import UNSEEN, joined
+from tetsimplify.kernels.blocks import SHARED
 from tetsimplify.kernels.jit import kernel_in_place
+
+UNSEEN = -2  # no vertex of the loop yet
 
 
 @kernel_in_place
@@ -19,4 +21,5 @@ def find_loop_homes(loop, merged_into, vertex_block, home):
     home[:] = UNSEEN
     for v in range(loop.size):
         if loop[v] >= 0 and merged_into[v] == v:
-            home[loop[v]] = joined(home[loop[v]], vertex_block[v])
+            known, block = home[loop[v]], vertex_block[v]
+            home[loop[v]] = block if known == UNSEEN or known == block else SHARED
