@@ -128,6 +128,8 @@ class Engine:
         self._face_origin = self._arranged.face_origin
         self._listed = np.arange(m, dtype=np.int32)
         self.options, self.rules = options, options.rules()
+        if bound is not None:
+            self.rules = self.rules._replace(is_bounded=True)
         self._outer = options.outer_code()
         self.min_faces = options.fewest_faces(m)
         self.is_part = False
@@ -237,7 +239,7 @@ class Engine:
         bundles = self._surface, self._quadrics, self.rules, self._cost
 
         def task(part: slice) -> None:
-            kernels.cost.rank(*bundles, part.start, part.stop, 1)
+            kernels.cost.rank(*bundles, start_scratch(0, 0, 0), part.start, part.stop, 1)
 
         self._crew.share(task, len(self._face_origin), blocks.PART)
 
@@ -317,7 +319,7 @@ class Engine:
         n_faces = len(self._face_origin)
         step = max(1, n_faces // SAMPLE)
         bundles = self._surface, self._quadrics, self.rules, self._cost
-        kernels.cost.rank(*bundles, 0, n_faces, step)
+        kernels.cost.rank(*bundles, self._scratch, 0, n_faces, step)
         is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
         costs = self._cost.reshape(-1, 3)[::step][is_ranked]
         return np.sort(costs[costs < np.inf])

@@ -167,6 +167,7 @@ class Options:
         return kernels.state.Rules(
             max_length2=length**2,
             by_length=self.by_length,
+            is_bounded=self.max_quadric_error is not None,
             blocked=BLOCKED.index(self.blocked),
             removal_limit2=float(limit) ** 2,
             removal_edges2=in_edges**2,

@@ -179,8 +179,9 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
         mark=np.zeros(n_coned, np.int32),
         face_mark=np.zeros(n_faces, np.int32),
         nodes=np.zeros((3, n_nodes), np.int32),
-        lists=np.empty((state.N_LISTS, n_faces + 2), np.int32),
+        lists=np.empty((state.N_LISTS, max(n_faces + 2, 3 * state.AT_ONCE)), np.int32),
         point=np.zeros(state.POINT_SIZE),
+        lanes=np.zeros(state.N_ROWS * state.LANES),
     )
     scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
     return scratch

@@ -11,7 +11,13 @@ from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition
 from tetsimplify.kernels.placement import find_place
-from tetsimplify.kernels.quadrics import MAX_ERROR2, error_bound, increase, merge_quadrics, weight
+from tetsimplify.kernels.quadrics import (
+    MAX_ERROR2,
+    increase,
+    is_beyond_bound,
+    merge_quadrics,
+    weight,
+)
 from tetsimplify.kernels.state import (
     BLOCK,
     CONTRACTIBLE,
@@ -132,7 +138,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
 def _judge(quadrics, scratch, rules, v, u):
     """Whether the place found, which need not be the best one, is within the bounds."""
     error = scratch.point[ERROR]
-    if error > (weight(quadrics, v) + weight(quadrics, u)) * error_bound(quadrics, v, u):
+    if rules.is_bounded and is_beyond_bound(quadrics, v, u, error):
         return ERROR_BOUND
     scratch.point[COST] = increase(quadrics, v, u, error) * scratch.point[FACTOR]
     is_dear = scratch.point[COST] > scratch.point[MAX_PRICE] and not rules.by_length

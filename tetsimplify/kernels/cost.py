@@ -6,14 +6,25 @@ from tetsimplify.kernels.corners import ahead
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
-from tetsimplify.kernels.quadrics import error_bound, increase, sum_at, weight
+from tetsimplify.kernels.quadrics import (
+    CONSTANT,
+    increase,
+    is_beyond_bound,
+    reachable_optimum,
+    sum_at,
+    value,
+)
 from tetsimplify.kernels.state import (
+    AT_ONCE,
     CONTRACTIBLE,
     ERROR_BOUND,
+    LANES,
     LOCKED,
     MOVED_EVEN,
+    PENDING,
     RANKED,
     SETTLED,
+    WAITING,
 )
 
 
@@ -63,42 +74,106 @@ def _ranked_cost(surface, quadrics, rules, a, b):
     )
     fixed = fixed_place(surface, a, b)
     error = least_error(sum_at(quadrics, vertices, a, b), x, y, z, fixed, rules)[4]
-    if error > (weight(quadrics, a) + weight(quadrics, b)) * error_bound(quadrics, a, b):
+    if rules.is_bounded and is_beyond_bound(quadrics, a, b, error):
         return np.inf, ERROR_BOUND
     return length2 if rules.by_length else increase(quadrics, a, b, error), CONTRACTIBLE
 
 
 @part
-def rank_face(surface, quadrics, rules, cost, f):
-    """Bring the costs of the edges of a face up to date.
+def rank_faces(surface, quadrics, rules, cost, scratch, n_faces):
+    """Bring the costs of the edges of the faces WAITING up to date, but of those that are RANKED.
 
     Every edge is looked at from one face only, where it begins at its lower vertex. Its other
-    corner has an infinite cost.
+    corner has an infinite cost. Where the optimum decides, LANES edges are computed side by side.
     """
-    state = surface.face_state[f]
-    unchanged = (
-        (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1
-    )  # opposite of what moved
-    surface.face_state[f] = RANKED
-    for k in range(3):
-        if k == unchanged:
+    waiting, pending = scratch.lists[WAITING], scratch.lists[PENDING]
+    side_by_side = quadrics is not None and rules.optimum
+    corner_vertex, n_pending = surface.corner_vertex, 0
+    for i in range(n_faces):
+        f = waiting[i]
+        state = surface.face_state[f]
+        if state == RANKED:
             continue
-        corner = 3 * f + k
-        a = surface.corner_vertex[corner]
-        b = surface.corner_vertex[ahead(corner)]
-        price, verdict = np.inf, CONTRACTIBLE
-        if is_ranked(surface.loop, a, b):
-            price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
-        cost[corner] = price
-        surface.verdict[corner] = verdict
+        surface.face_state[f] = RANKED
+        unchanged = (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1
+        for k in range(3):
+            if k == unchanged:
+                continue
+            corner = 3 * f + k
+            a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
+            cost[corner] = np.inf
+            surface.verdict[corner] = CONTRACTIBLE
+            if not side_by_side or is_special(surface, a, b):
+                if is_ranked(surface.loop, a, b):
+                    cost[corner], surface.verdict[corner] = _ranked_cost(
+                        surface, quadrics, rules, a, b
+                    )
+                continue
+            pending[n_pending] = corner
+            n_pending += a < b
+    if side_by_side:
+        for i in range(0, n_pending, LANES):
+            corners = pending[i : min(i + LANES, n_pending)]
+            _rank_side_by_side(surface, quadrics, rules, cost, corners, scratch.lanes)
+
+
+@part
+def is_special(surface, a, b):
+    """Whether the place of the edge ab is fixed, or it is forbidden: which is looked at alone."""
+    loop, locked = surface.loop, surface.locked
+    return (loop[a] >= 0) | (loop[b] >= 0) | (locked[a] != 0) | (locked[b] != 0)
+
+
+@part
+def _rank_side_by_side(surface, quadrics, rules, cost, corners, lanes):
+    """Find the costs of at most LANES edges, at the places of least error."""
+    corner_vertex, vertices = surface.corner_vertex, surface.vertices
+    for j in range(corners.size):
+        a = np.uint32(corner_vertex[corners[j]])
+        b = np.uint32(corner_vertex[ahead(corners[j])])
+        (
+            lanes[j], lanes[LANES + j], lanes[2 * LANES + j], lanes[3 * LANES + j],
+            lanes[4 * LANES + j], lanes[5 * LANES + j], lanes[6 * LANES + j],
+            lanes[7 * LANES + j], lanes[8 * LANES + j], lanes[9 * LANES + j],
+        ) = sum_at(quadrics, vertices, a, b)  # fmt: skip
+        lanes[10 * LANES + j] = vertices[b, 0] - vertices[a, 0]
+        lanes[11 * LANES + j] = vertices[b, 1] - vertices[a, 1]
+        lanes[12 * LANES + j] = vertices[b, 2] - vertices[a, 2]
+        lanes[13 * LANES + j] = quadrics.linear[a, CONSTANT] + quadrics.linear[b, CONSTANT]
+    for j in range(LANES):
+        q = (
+            lanes[j], lanes[LANES + j], lanes[2 * LANES + j], lanes[3 * LANES + j],
+            lanes[4 * LANES + j], lanes[5 * LANES + j], lanes[6 * LANES + j],
+            lanes[7 * LANES + j], lanes[8 * LANES + j], lanes[9 * LANES + j],
+        )  # fmt: skip
+        ex, ey, ez = lanes[10 * LANES + j], lanes[11 * LANES + j], lanes[12 * LANES + j]
+        x, y, z, is_near = reachable_optimum(q, ex, ey, ez)
+        length2, error = ex * ex + ey * ey + ez * ez, value(q, x, y, z)
+        increase = max(error - lanes[13 * LANES + j], 0.0)
+        lanes[13 * LANES + j] = error
+        lanes[14 * LANES + j] = length2 if rules.by_length else increase
+        lanes[15 * LANES + j] = 1.0 if is_near & (length2 < rules.max_length2) else 0.0
+    for j in range(corners.size):
+        corner = corners[j]
+        cost[corner] = lanes[14 * LANES + j]
+        is_found = lanes[15 * LANES + j] != 0.0
+        if is_found and not rules.is_bounded:
+            continue
+        a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
+        if not is_found or is_beyond_bound(quadrics, a, b, lanes[13 * LANES + j]):
+            cost[corner], surface.verdict[corner] = _ranked_cost(surface, quadrics, rules, a, b)
 
 
 @kernel_in_place
-def rank(surface, quadrics, rules, cost, first, last, step):
+def rank(surface, quadrics, rules, cost, scratch, first, last, step):
     """Bring the costs of every so many-th face up to date."""
-    for f in range(first, last, step):
-        if surface.face_state[f] != SETTLED and surface.face_state[f] != RANKED:
-            rank_face(surface, quadrics, rules, cost, f)
+    waiting = scratch.lists[WAITING]
+    for begin in range(first, last, step * AT_ONCE):
+        n = 0
+        for f in range(begin, min(begin + step * AT_ONCE, last), step):
+            waiting[n] = f
+            n += surface.face_state[f] != SETTLED
+        rank_faces(surface, quadrics, rules, cost, scratch, n)
 
 
 @kernel

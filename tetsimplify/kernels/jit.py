@@ -1,6 +1,7 @@
 """The one decorator of all kernels.
 
-``nogil`` lets threads run kernels side by side; ``cache`` keeps the machine code on disk.
+``nogil`` lets threads run kernels side by side; ``cache`` keeps the machine code on disk. Division
+by zero gives what NumPy gives: a branch for an exception would keep loops from being vectorised.
 There is no ``fastmath`` (predicates must mean what they say) and no ``parallel`` (its
 default threading layer aborts the process when two Python threads enter it).
 
@@ -71,10 +72,10 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
     if numba.config.DISABLE_JIT:
         return function
     try:
-        compiled = numba.njit(nogil=True, cache=True, **options)(function)
+        compiled = numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
     except RuntimeError as error:  # no folder that the cache could be written to
         warnings.warn(f"kernels are compiled anew in every process: {error}", stacklevel=3)
-        return numba.njit(nogil=True, **options)(function)
+        return numba.njit(nogil=True, error_model="numpy", **options)(function)
     numbered = compiled._cache._cache_file
     name = f"{numbered._index_name.removesuffix('.nbi')}.{KERNELS_DIGEST[:16]}"
     compiled._cache._cache_file = CacheFile(numbered._cache_path, name, KERNELS_DIGEST)

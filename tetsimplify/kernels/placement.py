@@ -7,7 +7,7 @@ is left in `scratch.point`.
 
 from tetsimplify.kernels.guards import NO_GUARD, harm, turns_over
 from tetsimplify.kernels.jit import part
-from tetsimplify.kernels.quadrics import MAX_REACH, optimum, sum_at, value
+from tetsimplify.kernels.quadrics import reachable_optimum, sum_at, value
 from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE, STAR
 
 FREE = -1.0  # no end of the edge has to stay
@@ -76,11 +76,9 @@ def least_error(q, x, y, z, fixed, rules):
     if fixed != FREE:
         return fixed * x, fixed * y, fixed * z, fixed, value(q, fixed * x, fixed * y, fixed * z)
     if rules.optimum:
-        px, py, pz = optimum(q, 0.5 * x, 0.5 * y, 0.5 * z)
-        dx, dy, dz = px - 0.5 * x, py - 0.5 * y, pz - 0.5 * z
-        length2 = x * x + y * y + z * z
-        if dx * dx + dy * dy + dz * dz <= MAX_REACH * MAX_REACH * length2:
-            along = px * x + py * y + pz * z
+        px, py, pz, is_near = reachable_optimum(q, x, y, z)
+        if is_near:
+            along, length2 = px * x + py * y + pz * z, x * x + y * y + z * z
             place = min(max(along / length2, 0.0), 1.0) if length2 > 0.0 else 0.5
             return px, py, pz, place, value(q, px, py, pz)
     best, least = (

@@ -111,17 +111,22 @@ def error_bound(quadrics, v, u):
 
 
 @part
+def is_beyond_bound(quadrics, v, u, error):
+    """Whether an error of v and u together is more than both allow."""
+    return error > (weight(quadrics, v) + weight(quadrics, u)) * error_bound(quadrics, v, u)
+
+
+@part
 def optimum(q, x, y, z):
     """Where q is least, held by a spring at the place given where the planes do not decide.
 
     As if computed again and again, with the spring at what came out: so what the planes do decide
     becomes as good as exact, and what they do not decide hardly moves. With the spring s and
-    M = s / (A + s), the sum (1 + M + M^2 + ...) of the steps is one polynomial.
+    M = s / (A + s), the sum (1 + M + M^2 + ...) of the steps is one polynomial. NaN where there are
+    no planes.
     """
     axx, axy, axz, ayy, ayz, azz, bx, by, bz, _ = q
     spring = STABILITY * (axx + ayy + azz)
-    if spring <= 0.0:
-        return x, y, z
     sxx, syy, szz = axx + spring, ayy + spring, azz + spring
     ixx, ixy, ixz = syy * szz - ayz * ayz, axz * ayz - axy * szz, axy * ayz - axz * syy
     iyy, iyz, izz = sxx * szz - axz * axz, axy * axz - sxx * ayz, sxx * syy - axy * axy
@@ -140,6 +145,15 @@ def optimum(q, x, y, z):
         dy = step_y + (ixy * gx + iyy * gy + iyz * gz)
         dz = step_z + (ixz * gx + iyz * gy + izz * gz)
     return x - dx, y - dy, z - dz
+
+
+@part
+def reachable_optimum(q, x, y, z):
+    """The optimum for an edge from 0 to a place, and whether it is near enough to be believed."""
+    px, py, pz = optimum(q, 0.5 * x, 0.5 * y, 0.5 * z)
+    dx, dy, dz = px - 0.5 * x, py - 0.5 * y, pz - 0.5 * z
+    reach2 = MAX_REACH * MAX_REACH * (x * x + y * y + z * z)
+    return px, py, pz, dx * dx + dy * dy + dz * dz <= reach2
 
 
 @part

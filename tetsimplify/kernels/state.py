@@ -55,6 +55,7 @@ class Rules(NamedTuple):
 
     max_length2: float  # edges shorter than the root of this are contracted
     by_length: bool  # where costs are kept: they are squared lengths, not quadric errors
+    is_bounded: bool  # whether there are bounds on the quadric error
     blocked: int  # CONTRACT, SKIP or VIOLATE
     removal_limit2: float  # how far from the edge vertices may be removed, squared
     removal_edges2: float  # the same in lengths of the edge; the larger one counts
@@ -78,6 +79,7 @@ class Scratch(NamedTuple):
     nodes: np.ndarray  # int32 (3, n + n_loops): what is known of vertices for a while, below
     lists: np.ndarray  # int32 (N_LISTS, m + 2): lists, below
     point: np.ndarray  # float64: middle of the edge, then the new vertex; and more, below
+    lanes: np.ndarray  # float64 (N_ROWS * LANES,): rows of what is computed side by side
 
 
 # Places in `Scratch.tally`: what has been done, and what is at hand.
@@ -94,6 +96,11 @@ TALLY_SIZE = 14
 # where costs are kept, what an edge may cost in this sweep, and with the factor for the shapes.
 PLACE, ERROR, FACTOR, COST, REMOVAL2, MAX_COST, MAX_PRICE = 3, 4, 5, 6, 7, 8, 9
 POINT_SIZE = 10
+
+# So many edges, or faces around an edge, are computed side by side, in the wide registers of the
+# processor: a multiple of what they hold. Rows of `Scratch.lanes` are as long.
+LANES, N_ROWS = 16, 16
+AT_ONCE = 256  # faces whose edges are ranked before the first of them is contracted
 
 # Rows of `Scratch.nodes`.
 SLOT = 0  # sparse set: place of a vertex in some list
@@ -112,4 +119,5 @@ STATUS = 14  # of each lens
 VOTES, LENGTHS_A, LENGTHS_B = 15, 16, 17  # of the common neighbours, see outer.py
 DEFERRED = 18  # faces with a blocked edge, put off to the end of the sweep
 WAITING = 19  # faces that a sweep has to look at
-N_LISTS = 20
+PENDING = 20  # corners where edges begin that are to be ranked
+N_LISTS = 21

@@ -10,9 +10,10 @@ import numpy as np
 
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import cheapest, edge_costs, rank_face, without
+from tetsimplify.kernels.cost import cheapest, edge_costs, rank_faces, without
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
 from tetsimplify.kernels.state import (
+    AT_ONCE,
     BLOCK,
     BLOCKED,
     CONTRACTIBLE,
@@ -202,22 +203,37 @@ def _sweep_block_ranked(
     surface, quadrics, watch, scratch, rules, cost, listed, first, last, colour, is_last
 ):
     """Sweep once over the faces listed; in the last sweep put off what is nested."""
+    n_contracted = 0
+    for begin in range(first, last, AT_ONCE):
+        if scratch.tally[N_SPARE] < 2:
+            break
+        end = min(begin + AT_ONCE, last)
+        n_contracted += _sweep_run_ranked(
+            surface, quadrics, watch, scratch, rules, cost, listed, begin, end, colour, is_last
+        )
+    return n_contracted
+
+
+@inlined
+def _sweep_run_ranked(
+    surface, quadrics, watch, scratch, rules, cost, listed, first, last, colour, is_last
+):
+    """Sweep once over at most AT_ONCE faces."""
     max_cost = scratch.point[MAX_COST]
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
         f = listed[i]
         state = surface.face_state[f]
         is_cheap = min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) < max_cost
+        is_stale = (state != RANKED) & (state != SETTLED) & (not _is_touched(state, colour))
         waiting[n_waiting] = f
-        n_waiting += (state != SETTLED) & ((state != RANKED) | is_cheap)
+        n_waiting += is_stale | ((state == RANKED) & is_cheap)
+    rank_faces(surface, quadrics, rules, cost, scratch, n_waiting)
     n_contracted = 0
     for i in range(n_waiting):
         f = waiting[i]
-        state = surface.face_state[f]
-        if state != RANKED:
-            if state == SETTLED or _is_touched(state, colour):
-                continue
-            rank_face(surface, quadrics, rules, cost, f)
+        if surface.face_state[f] != RANKED:
+            continue
         costs = cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]
         least, k = cheapest(costs)
         if least >= max_cost:
@@ -246,7 +262,7 @@ def _sweep_block_ranked(
 def _is_touched(state, colour):
     """Whether a face has been touched in the sweep of a colour, where costs are kept."""
     stale = STALE_EVEN if colour == MOVED_EVEN else STALE_ODD
-    return state == stale or (state >= colour and state < colour + 3)
+    return (state == stale) | ((state >= colour) & (state < colour + 3))
 
 
 @part
