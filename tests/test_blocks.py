@@ -28,6 +28,7 @@ def small_blocks(monkeypatch):
     """Blocks of so few faces that small meshes have many."""
     monkeypatch.setattr(blocks, "FACES", 120)
     monkeypatch.setattr(blocks, "RUN", 120)
+    monkeypatch.setattr(blocks, "LONGEST_RUN", 120)
     monkeypatch.setattr(blocks, "PART", 100)
     monkeypatch.setattr(blocks, "MOST_SHARED", 1.0)
     monkeypatch.setattr(blocks, "CELL", 30)
@@ -107,6 +108,7 @@ def test_faces_in_no_order_are_not_divided_in_runs(small_blocks, monkeypatch):
     """Much would lie between runs of them; they are put in order, too."""
     monkeypatch.setattr(blocks, "MOST_SHARED", 0.2)
     monkeypatch.setattr(blocks, "RUN", 8000)
+    monkeypatch.setattr(blocks, "LONGEST_RUN", 8000)
     vertices, faces = grid_of_tubes(60)
     shuffled = faces[np.random.default_rng(0).permutation(len(faces))]
     assert engine_of((vertices, faces), max_edge_length=1.0)._arranged.is_as_given
@@ -192,6 +194,7 @@ def test_runs_side_by_side_make_no_difference(small_blocks):
 def test_topology_is_kept_and_nothing_contractible_is_left(small_blocks, monkeypatch, seed):
     monkeypatch.setattr(blocks, "FACES", 8)
     monkeypatch.setattr(blocks, "RUN", 8)
+    monkeypatch.setattr(blocks, "LONGEST_RUN", 8)
     monkeypatch.setattr(blocks, "CELL", 2)
     vertices, faces = strategies.adversarial_mesh(seed)
     result = tetsimplify.simplify(vertices, faces, max_edge_length=1e6, threads=2, **OFF)
@@ -210,6 +213,7 @@ def test_topology_is_kept_and_nothing_contractible_is_left(small_blocks, monkeyp
 def test_topology_is_kept_in_blocks_at_length(small_blocks, monkeypatch, block):
     monkeypatch.setattr(blocks, "FACES", 8)
     monkeypatch.setattr(blocks, "RUN", 8)
+    monkeypatch.setattr(blocks, "LONGEST_RUN", 8)
     monkeypatch.setattr(blocks, "CELL", 2)
     for seed in range(block, 4_000, 10):
         vertices, faces = strategies.adversarial_mesh(seed)
@@ -288,6 +292,7 @@ def test_no_seams_are_left_between_blocks(mode, monkeypatch):
     surface as it comes out in one piece. Inside of blocks hardly anything may differ.
     """
     monkeypatch.setattr(blocks, "RUN", blocks.FACES)
+    monkeypatch.setattr(blocks, "LONGEST_RUN", blocks.FACES)
     monkeypatch.setattr(blocks, "MOST_SHARED", 1.0)
     mesh = grid_of_tubes(100)
     length = 1.5 * float(np.median(edge_lengths(mesh)))

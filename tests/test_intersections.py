@@ -20,6 +20,7 @@ from tetsimplify.kernels.crossing import faces_cross
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.intersections import watch_over
 from tetsimplify.kernels.lens import keep_one_lens
+from tetsimplify.kernels.link import list_ring
 from tetsimplify.kernels.placement import find_place
 from tetsimplify.kernels.predicates import orient2d, orient3d
 from tetsimplify.kernels.state import (
@@ -391,7 +392,8 @@ def find_crossing(watch, surface, scratch, rules, corner):
     lens = keep_one_lens(surface, scratch, rules, None, corner)
     if lens.outcome != CONTRACTIBLE:
         return -1
-    placed = find_place(surface, None, scratch, rules, v, u, lens.n_v, lens.n_u)
+    list_ring(surface, scratch, lens.n_v, lens.n_u)
+    placed = find_place(surface, None, scratch, rules, v, u)
     if placed != CONTRACTIBLE:
         return -1
     return int(star_crosses(watch, surface, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed))

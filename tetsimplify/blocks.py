@@ -21,7 +21,8 @@ from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
 
 FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
-RUN = 2**16  # faces in a block of faces as they are given: few of so many are at its ends
+RUN = 2**16  # faces in a block of faces as they are given, at least: few of them are at its ends,
+LONGEST_RUN, N_RUNS = 2**17, 16  # and fewer of longer ones, where there are enough to share
 CELL = 2**10  # faces: blocks are made of cells of about so many
 AT_ONCE = 16  # blocks of FACES in a task for a thread
 PART = 2**17  # faces in a part, where what is done with them does not depend on the parts
@@ -82,7 +83,8 @@ def runs(mesh: Mesh, crew: Crew) -> Cells | None:
     """
     m = len(mesh.faces)
     by_order, n_cells = _by_order(m), m // CELL + 1
-    cells = Cells((by_order, by_order), (n_cells, n_cells), RUN, (RUN, RUN // 2), 1)
+    run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
+    cells = Cells((by_order, by_order), (n_cells, n_cells), run, (run, run // 2), 1)
     vertex_block = np.zeros(len(mesh.vertices), np.int32)
     divide(cells, 0, mesh.faces.reshape(-1), vertex_block, np.empty(m, np.int32), crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)

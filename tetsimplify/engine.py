@@ -18,7 +18,7 @@ from tetsimplify.edges import edge_extremes
 from tetsimplify.locality import Arrangement, as_given, by_locality
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
-from tetsimplify.start import start_quadrics, start_scratch, start_surface
+from tetsimplify.start import new_costs, start_quadrics, start_scratch, start_surface
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.intersections import Watch
@@ -123,7 +123,7 @@ class Engine:
             self._quadrics = start_quadrics(
                 self._surface, first_corner, options, arranged_bound, self._crew
             )
-        self._cost = None if options.has_one_threshold else np.full(3 * m, np.inf, np.float32)
+        self._cost = None if options.has_one_threshold else new_costs(m)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
         self._listed = np.arange(m, dtype=np.int32)
@@ -321,14 +321,17 @@ class Engine:
         bundles = self._surface, self._quadrics, self.rules, self._cost
         kernels.cost.rank(*bundles, self._scratch, 0, n_faces, step)
         is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
-        costs = self._cost.reshape(-1, 3)[::step][is_ranked]
+        costs = self._cost.reshape(-1, kernels.cost.COLUMNS)[::step, :3][is_ranked]
         return np.sort(costs[costs < np.inf])
 
     def forget_refusals(self) -> None:
         """Let all edges be ranked and tried again."""
         state = kernels.state
         untouched = state.STALE_ODD if self._colour == state.MOVED_EVEN else state.STALE_EVEN
-        self._surface.face_state[self._surface.face_state == state.RANKED] = untouched
+        is_ranked = self._surface.face_state == state.RANKED
+        self._surface.face_state[is_ranked] = untouched
+        assert self._cost is not None
+        self._cost[kernels.cost.LEAST :: kernels.cost.COLUMNS][is_ranked] = -np.inf
 
     # --- threads ----------------------------------------------------------------------------------
 
@@ -538,37 +541,36 @@ class Engine:
             self._watch = self._new_watch()
 
     def _compact(self, *, is_last: bool = False) -> None:
-        """Drop the dead faces. Corners are not linked anew when nothing is contracted any more."""
+        """Drop the dead faces. The last time corners need not be linked."""
         surface, crew, m = self._surface, self._crew, len(self._face_origin)
         counts = crew.share(self._count_live, m, blocks.PART)
         begin = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
         n_live = int(begin[-1])
-        corner_vertex = np.empty(3 * n_live, np.int32)
-        face_state, verdict = np.empty(n_live, np.uint8), np.empty(3 * n_live, np.uint8)
-        cost = None if self._cost is None else np.empty(3 * n_live, np.float32)
-        origin = np.empty(n_live, np.int32)
+        cost = None if self._cost is None else new_costs(n_live)
+        place, origin = np.empty(m, np.int32), np.empty(n_live, np.int32)
+        live = surface._replace(
+            corner_vertex=np.empty(3 * n_live, np.int32),
+            next_corner=np.empty(3 * n_live, np.int32),
+            face_state=np.empty(n_live, np.uint8),
+            verdict=np.empty(3 * n_live, np.uint8),
+        )
 
         def copy(part: slice) -> None:
             kernels.result.copy_live_faces(
                 *(surface, self._cost, self._face_origin, part.start, part.stop),
-                *(begin[part.start // blocks.PART], corner_vertex, face_state, verdict, cost),
-                origin,
+                *(begin[part.start // blocks.PART], place, live, cost, origin),
             )
 
+        def link(part: slice) -> None:
+            kernels.result.copy_links(surface, part.start, part.stop, place, live)
+
         crew.share(copy, m, blocks.PART)
-        if self._cells is not None and not is_last:
-            self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
-        next_corner = surface.next_corner
         if not is_last:
-            next_corner = kernels.corners.link_corners(corner_vertex, len(surface.vertices))[1]
-        self._cost, self._face_origin = cost, origin
+            crew.share(link, m, blocks.PART)
+            if self._cells is not None:
+                self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
+        self._surface, self._cost, self._face_origin = live, cost, origin
         self._listed = np.arange(n_live, dtype=np.int32)
-        self._surface = surface._replace(
-            corner_vertex=corner_vertex,
-            next_corner=next_corner,
-            face_state=face_state,
-            verdict=verdict,
-        )
         self._scratch.face_mark.fill(0)
 
     def _count_live(self, part: slice) -> int:

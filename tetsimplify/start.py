@@ -171,6 +171,13 @@ def new_quadrics(n_vertices: int) -> Quadrics:
     return quadrics
 
 
+def new_costs(n_faces: int) -> NDArray[np.float32]:
+    """Rows of costs of the edges of so many faces, none of them up to date."""
+    costs = np.full((n_faces, kernels.cost.COLUMNS), np.inf, np.float32)
+    costs[:, kernels.cost.LEAST] = -np.inf
+    return costs.reshape(-1)
+
+
 def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     """Scratch space for so many faces, real and virtual vertices, and as many or no nodes."""
     state = kernels.state
@@ -180,8 +187,9 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
         face_mark=np.zeros(n_faces, np.int32),
         nodes=np.zeros((3, n_nodes), np.int32),
         lists=np.empty((state.N_LISTS, max(n_faces + 2, 3 * state.AT_ONCE)), np.int32),
+        ring=np.empty((2, 2 * n_faces + 4), np.int32),
         point=np.zeros(state.POINT_SIZE),
-        lanes=np.zeros(state.N_ROWS * state.LANES),
+        lanes=np.zeros(state.N_ROWS * state.WIDTH),
     )
     scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
     return scratch

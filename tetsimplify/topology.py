@@ -151,7 +151,7 @@ class Examined(NamedTuple):
     loop: Indices
     """Shape (n,): the number of the boundary loop of each vertex, -1 inside."""
     next_corner: Indices
-    """Shape (3 m,): the corner table, as of `kernels.corners.link_corners`."""
+    """Shape (3 m,): the corner table, see `kernels.corners`."""
     first_corner: Indices
     """Shape (n,): a corner of each vertex, -1 where it has none."""
 
@@ -182,8 +182,8 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
     )
 
     def survey(part: slice) -> tuple[int, int, int]:
-        arcs = np.empty((2, kernels.surface.MOST_ARCS), np.int32)
-        slots = np.full((2, kernels.surface.SLOTS), -1, np.int64)
+        arcs = np.empty((3, kernels.surface.MOST_ARCS), np.int32)
+        slots = np.full((3, kernels.surface.SLOTS), -1, np.int64)
         counts: tuple[int, int, int]
         counts = kernels.surface.survey_inside(
             corner_vertex, part.start, part.stop, found, arcs, slots

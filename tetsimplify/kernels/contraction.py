@@ -7,9 +7,10 @@ the new vertex get the state `colour`.
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD, ahead, face_of
+from tetsimplify.kernels.cost import COLUMNS, LEAST
 from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
-from tetsimplify.kernels.link import gather_stars, link_condition
+from tetsimplify.kernels.link import gather_stars, link_condition, list_ring
 from tetsimplify.kernels.placement import find_place
 from tetsimplify.kernels.quadrics import (
     MAX_ERROR2,
@@ -54,7 +55,7 @@ from tetsimplify.kernels.watch import follow, star_crosses
 
 
 @inlined
-def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
+def contract_simple(surface, quadrics, watch, scratch, rules, cost, corner, colour):
     """Contract the edge that begins at `corner` if the link condition allows it.
 
     NESTED when it does not; with ``blocked="violate"`` it does not matter. OUTSIDE when a face at
@@ -67,14 +68,14 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
         return OUTSIDE
     if surface.locked[v] + surface.locked[u] > 1:
         return LOCKED
-    n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, corner)
+    n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, rules, corner)
     if rules.blocked != VIOLATE:
         allowed = link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common)
         if allowed != CONTRACTIBLE:
             return allowed
     if n_doomed > scratch.tally[N_SPARE]:
         return ENOUGH
-    placed = find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+    placed = find_place(surface, quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and quadrics is not None:
         placed = _judge(quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and watch is not None:
@@ -85,7 +86,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
     loop = max(surface.loop[v], surface.loop[u])
     if n_doomed == 1 and loop >= 0 and surface.loop_home[loop] == block:
         surface.loop_size[loop] -= 1
-    _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour)
+    _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour)
     if watch is not None:
         follow(watch, surface, scratch.lists[STAR], n_v + n_u)
     scratch.tally[N_SIMPLE] += 1
@@ -93,7 +94,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, corner, colour):
 
 
 @inlined
-def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, colour, commit):
+def contract_nested(surface, quadrics, watch, scratch, rules, cost, outer, corner, colour, commit):
     """Contract the edge that begins at `corner` and remove the lenses beside the kept one.
 
     Where the link condition allows the contraction there is but one lens, which is kept.
@@ -105,7 +106,8 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
     lens = keep_one_lens(surface, scratch, rules, outer, corner)
     if lens.outcome != CONTRACTIBLE:
         return lens.outcome
-    placed = find_place(surface, quadrics, scratch, rules, v, u, lens.n_v, lens.n_u)
+    list_ring(surface, scratch, lens.n_v, lens.n_u)
+    placed = find_place(surface, quadrics, scratch, rules, v, u)
     if placed == CONTRACTIBLE and lens.n_doomed > scratch.tally[N_SPARE]:
         placed = ENOUGH
     if placed == CONTRACTIBLE and quadrics is not None:
@@ -122,7 +124,7 @@ def contract_nested(surface, quadrics, watch, scratch, rules, outer, corner, col
     while vertex >= 0:
         surface.merged_into[vertex] = -1
         vertex = scratch.nodes[FOLLOWER, vertex]
-    _merge(surface, quadrics, scratch, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
+    _merge(surface, quadrics, scratch, cost, v, u, lens.n_v, lens.n_u, lens.n_doomed, colour)
     if watch is not None:
         follow(watch, surface, scratch.lists[STAR], lens.n_v + lens.n_u)
     if scratch.tally[N_LENSES] > 1:
@@ -164,12 +166,14 @@ def _add_removed(surface, quadrics, scratch, vertex):
 
 
 @part
-def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
+def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
     """Bury the doomed faces and make one vertex, v, of v and u: move it, link its corners."""
     corner_vertex, lists = surface.corner_vertex, scratch.lists
     for i in range(n_doomed):
         f = lists[DOOMED, i]
         surface.face_state[f] = SETTLED
+        if cost is not None:
+            cost[COLUMNS * f + LEAST] = np.inf
         for k in range(3):
             corner_vertex[3 * f + k] = DEAD
     scratch.tally[N_LIVE] -= n_doomed
@@ -191,7 +195,10 @@ def _merge(surface, quadrics, scratch, v, u, n_v, n_u, n_doomed, colour):
         corner_vertex[star[i]] = v
     for i in range(n):
         surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
-        surface.face_state[face_of(star[i])] = _touched(surface.face_state, star[i], colour)
+        f = face_of(star[i])
+        surface.face_state[f] = _touched(surface.face_state, star[i], colour)
+        if cost is not None:
+            cost[COLUMNS * f + LEAST] = -np.inf
 
 
 @part

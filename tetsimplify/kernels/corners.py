@@ -1,7 +1,7 @@
 r"""The corner table: faces, and for each vertex the circular list of its corners.
 
 Corner ``3 f + k`` is the k-th corner of face f. All corners of one vertex form a circular
-singly linked list, in no particular order:
+singly linked list, anticlockwise; where the vertex is on a boundary there is a gap somewhere in it:
 
                  v                 corner_vertex[c]  the vertex v of corner c
               / c | d \            next_corner[c]    another corner d of v
@@ -43,6 +43,13 @@ def others(corner_vertex, corner):
     following = c - np.uint32(2) if k == 2 else c + np.uint32(1)
     preceding = c + np.uint32(2) if k == 0 else c - np.uint32(1)
     return corner_vertex[following], corner_vertex[preceding]
+
+
+@part
+def vertex_behind(corner_vertex, corner):
+    """The vertex of the corner behind, as of `others`."""
+    c = np.uint32(corner)
+    return corner_vertex[c + np.uint32(2) if c % np.uint32(3) == 0 else c - np.uint32(1)]
 
 
 @part

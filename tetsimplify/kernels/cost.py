@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
@@ -24,8 +23,16 @@ from tetsimplify.kernels.state import (
     PENDING,
     RANKED,
     SETTLED,
+    STALE_EVEN,
+    STALE_ODD,
     WAITING,
 )
+
+# A row of costs: of the edges that begin at the corners of a face, and the least of these. That is
+# -inf where the costs are not up to date, and inf of a face that is settled.
+COLUMNS, LEAST = 4, 3
+# By the state of a face: which of its edges is not to be ranked anew, opposite of what has moved.
+UNCHANGED = (-1,) * MOVED_EVEN + (1, 2, 0, 1, 2, 0)
 
 
 @part
@@ -46,7 +53,7 @@ def cheapest(costs):
     """The least of the costs of three edges, and which one it is."""
     x, y, z = costs
     least = min(min(x, y), z)
-    return least, 0 if x == least else 1 if y == least else 2
+    return least, np.int64(x != least) * (np.int64(1) + np.int64(y != least))
 
 
 @part
@@ -80,57 +87,105 @@ def _ranked_cost(surface, quadrics, rules, a, b):
 
 
 @part
-def rank_faces(surface, quadrics, rules, cost, scratch, n_faces):
-    """Bring the costs of the edges of the faces WAITING up to date, but of those that are RANKED.
+def least_cost(cost, f):
+    """The least of the costs of a face; less than all costs where they are not up to date."""
+    return cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)]
+
+
+@part
+def costs_of(cost, f):
+    """The costs of the three edges of a face."""
+    first = np.uint32(f) * np.uint32(COLUMNS)
+    return cost[first], cost[first + np.uint32(1)], cost[first + np.uint32(2)]
+
+
+@part
+def note_least(cost, f):
+    """Bring the least of the costs of a face up to date."""
+    x, y, z = costs_of(cost, f)
+    cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)] = min(min(x, y), z)
+
+
+@part
+def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
+    """Bring the costs of the faces WAITING up to date, but of those that are RANKED or touched.
 
     Every edge is looked at from one face only, where it begins at its lower vertex. Its other
     corner has an infinite cost. Where the optimum decides, LANES edges are computed side by side.
+
+    Parameters
+    ----------
+    n_faces : int
+        How many there are.
+    colour : int
+        That of the sweep, which tells what it has touched; -1 for none.
     """
-    waiting, pending = scratch.lists[WAITING], scratch.lists[PENDING]
-    side_by_side = quadrics is not None and rules.optimum
-    corner_vertex, n_pending = surface.corner_vertex, 0
+    waiting, lists = scratch.lists[WAITING], scratch.lists
+    n_pending = 0
     for i in range(n_faces):
-        f = waiting[i]
+        f = np.uint32(waiting[i])
         state = surface.face_state[f]
-        if state == RANKED:
+        if state == RANKED or is_touched(state, colour):
             continue
         surface.face_state[f] = RANKED
-        unchanged = (state - MOVED_EVEN + 1) % 3 if state >= MOVED_EVEN else -1
-        for k in range(3):
-            if k == unchanged:
-                continue
-            corner = 3 * f + k
-            a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
-            cost[corner] = np.inf
-            surface.verdict[corner] = CONTRACTIBLE
-            if not side_by_side or is_special(surface, a, b):
-                if is_ranked(surface.loop, a, b):
-                    cost[corner], surface.verdict[corner] = _ranked_cost(
-                        surface, quadrics, rules, a, b
-                    )
-                continue
-            pending[n_pending] = corner
-            n_pending += a < b
-    if side_by_side:
-        for i in range(0, n_pending, LANES):
-            corners = pending[i : min(i + LANES, n_pending)]
-            _rank_side_by_side(surface, quadrics, rules, cost, corners, scratch.lanes)
+        unchanged = UNCHANGED[state]
+        first = np.uint32(3) * f
+        a = surface.corner_vertex[first]
+        b = surface.corner_vertex[first + np.uint32(1)]
+        c = surface.corner_vertex[first + np.uint32(2)]
+        if quadrics is None or not rules.optimum or is_special(surface, a, b, c):
+            _rank_alone(surface, quadrics, rules, cost, f, a, b, c, unchanged)
+        else:
+            n_pending = _pend(surface, cost, lists, n_pending, f, 0, a, b, unchanged)
+            n_pending = _pend(surface, cost, lists, n_pending, f, 1, b, c, unchanged)
+            n_pending = _pend(surface, cost, lists, n_pending, f, 2, c, a, unchanged)
+    if quadrics is not None:
+        for first in range(0, n_pending, LANES):
+            n_edges = min(LANES, n_pending - first)
+            _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, scratch.lanes)
+    for i in range(n_faces):
+        note_least(cost, waiting[i])
 
 
 @part
-def is_special(surface, a, b):
-    """Whether the place of the edge ab is fixed, or it is forbidden: which is looked at alone."""
+def is_special(surface, a, b, c):
+    """Whether the place of an edge of abc is fixed or forbidden: such edges are looked at alone."""
     loop, locked = surface.loop, surface.locked
-    return (loop[a] >= 0) | (loop[b] >= 0) | (locked[a] != 0) | (locked[b] != 0)
+    a, b, c = np.uint32(a), np.uint32(b), np.uint32(c)
+    return ((loop[a] & loop[b] & loop[c]) >= 0) | ((locked[a] | locked[b] | locked[c]) != 0)
 
 
 @part
-def _rank_side_by_side(surface, quadrics, rules, cost, corners, lanes):
-    """Find the costs of at most LANES edges, at the places of least error."""
-    corner_vertex, vertices = surface.corner_vertex, surface.vertices
-    for j in range(corners.size):
-        a = np.uint32(corner_vertex[corners[j]])
-        b = np.uint32(corner_vertex[ahead(corners[j])])
+def _pend(surface, cost, lists, n, f, k, a, b, unchanged):
+    """Let the edge from the k-th corner of a face wait for its cost, if it is to be ranked."""
+    place = np.uint32(COLUMNS) * f + np.uint32(k)
+    corner = np.uint32(3) * f + np.uint32(k)
+    is_new = k != unchanged
+    cost[place] = np.float32(np.inf) if is_new else cost[place]
+    surface.verdict[corner] = CONTRACTIBLE if is_new else surface.verdict[corner]
+    lists[PENDING, n], lists[PENDING + 1, n], lists[PENDING + 2, n] = place, a, b
+    return n + (is_new & (a < b))
+
+
+@part
+def _rank_alone(surface, quadrics, rules, cost, f, a, b, c, unchanged):
+    """Find the costs of the edges of a face, one after the other."""
+    for k in range(3):
+        if k != unchanged:
+            v, u = (a, b) if k == 0 else (b, c) if k == 1 else (c, a)
+            price, verdict = np.inf, CONTRACTIBLE
+            if is_ranked(surface.loop, v, u):
+                price, verdict = _ranked_cost(surface, quadrics, rules, v, u)
+            cost[COLUMNS * f + k] = price
+            surface.verdict[3 * f + k] = verdict
+
+
+@part
+def _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, lanes):
+    """Find the costs of at most LANES edges PENDING, at the places of least error."""
+    vertices = surface.vertices
+    for j in range(n_edges):
+        a, b = np.uint32(lists[PENDING + 1, first + j]), np.uint32(lists[PENDING + 2, first + j])
         (
             lanes[j], lanes[LANES + j], lanes[2 * LANES + j], lanes[3 * LANES + j],
             lanes[4 * LANES + j], lanes[5 * LANES + j], lanes[6 * LANES + j],
@@ -153,15 +208,23 @@ def _rank_side_by_side(surface, quadrics, rules, cost, corners, lanes):
         lanes[13 * LANES + j] = error
         lanes[14 * LANES + j] = length2 if rules.by_length else increase
         lanes[15 * LANES + j] = 1.0 if is_near & (length2 < rules.max_length2) else 0.0
-    for j in range(corners.size):
-        corner = corners[j]
-        cost[corner] = lanes[14 * LANES + j]
+    for j in range(n_edges):
+        place = np.uint32(lists[PENDING, first + j])
+        cost[place] = lanes[14 * LANES + j]
         is_found = lanes[15 * LANES + j] != 0.0
         if is_found and not rules.is_bounded:
             continue
-        a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
+        a, b = lists[PENDING + 1, first + j], lists[PENDING + 2, first + j]
         if not is_found or is_beyond_bound(quadrics, a, b, lanes[13 * LANES + j]):
-            cost[corner], surface.verdict[corner] = _ranked_cost(surface, quadrics, rules, a, b)
+            corner = 3 * (place // COLUMNS) + place % COLUMNS
+            cost[place], surface.verdict[corner] = _ranked_cost(surface, quadrics, rules, a, b)
+
+
+@part
+def is_touched(state, colour):
+    """Whether a face has been touched in the sweep of a colour, where costs are kept."""
+    stale = STALE_EVEN if colour == MOVED_EVEN else STALE_ODD
+    return (colour >= 0) & ((state == stale) | ((state >= colour) & (state < colour + 3)))
 
 
 @kernel_in_place
@@ -173,7 +236,7 @@ def rank(surface, quadrics, rules, cost, scratch, first, last, step):
         for f in range(begin, min(begin + step * AT_ONCE, last), step):
             waiting[n] = f
             n += surface.face_state[f] != SETTLED
-        rank_faces(surface, quadrics, rules, cost, scratch, n)
+        rank_faces(surface, quadrics, rules, cost, scratch, n, -1)
 
 
 @kernel
@@ -182,8 +245,8 @@ def count_cheaper(cost, listed, blocks, threshold):
     n_cheaper = np.zeros(len(blocks), np.int64)
     for b in range(len(blocks)):
         for i in range(blocks[b, 0], blocks[b, 1]):
-            for corner in range(3 * listed[i], 3 * listed[i] + 3):
-                n_cheaper[b] += cost[corner] < threshold
+            x, y, z = costs_of(cost, listed[i])
+            n_cheaper[b] += np.int64(x < threshold) + (y < threshold) + (z < threshold)
     return n_cheaper
 
 

@@ -13,24 +13,28 @@ tetrahedron, or with the cone in a single triangle):
 
 import numpy as np
 
-from tetsimplify.kernels.corners import DEAD, ahead, face_of, others
-from tetsimplify.kernels.jit import part
+from tetsimplify.kernels.corners import DEAD, ahead, face_of, others, vertex_behind
+from tetsimplify.kernels.jit import cold_part, part
 from tetsimplify.kernels.state import (
     CONTRACTIBLE,
     DOOMED,
+    N_GAPS,
     NESTED,
     OBSTRUCTED,
+    RING_ALL,
+    RING_V,
     STAMP,
     STAR,
+    VIOLATE,
 )
 
 
 @part
-def gather_stars(surface, scratch, corner):
+def gather_stars(surface, scratch, rules, corner):
     """Collect the stars of the ends v, u of the edge that begins at `corner`.
 
     The corners that survive a simple contraction go to STAR, those of v first, the faces that it
-    removes to DOOMED.
+    removes to DOOMED, and the vertices around both ends to the ring.
 
     Returns
     -------
@@ -39,13 +43,68 @@ def gather_stars(surface, scratch, corner):
     n_common : int
         Number of real common neighbours of v and u.
     """
-    corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
-    star, doomed = scratch.lists[STAR], scratch.lists[DOOMED]
-    v = corner_vertex[corner]
-    u = corner_vertex[ahead(corner)]
+    v = surface.corner_vertex[corner]
+    u = surface.corner_vertex[ahead(corner)]
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
+    if surface.loop[v] < 0 and surface.loop[u] < 0 and rules.blocked != VIOLATE:
+        return _go_around(surface, scratch, corner, v, u, stamp)
+    n_v, n_u, n_doomed, n_common = _gather_in_any_order(surface, scratch, corner, v, u, stamp)
+    list_ring(surface, scratch, n_v, n_u)
+    return n_v, n_u, n_doomed, n_common
 
+
+@part
+def _go_around(surface, scratch, corner, v, u, stamp):
+    r"""Collect the stars of two vertices inside the surface: around v, then around u.
+
+       x -- .            The corners of v begin after the face vux and end before vyu,
+     / | \   \           those of u begin after vyu and end before vux. So the vertices
+    .  v--u   .          behind them lead from x to y and back to x.
+     \ | /   /
+       y -- .
+    """
+    corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
+    star, doomed, ring = scratch.lists[STAR], scratch.lists[DOOMED], scratch.ring[0]
+    x = vertex_behind(corner_vertex, corner)
+    doomed[0] = face_of(corner)
+    ring[0] = x
+    n = 0
+    c = next_corner[corner]
+    while True:
+        p = vertex_behind(corner_vertex, c)
+        star[n] = c
+        ring[n + 1] = p
+        if p == u:
+            break
+        mark[np.uint32(p if p != DEAD else v)] = stamp
+        n += p != DEAD
+        c = next_corner[np.uint32(c)]
+    doomed[1] = face_of(c)
+    n_v = n
+    y = ring[n]
+
+    n_common = 2
+    c = next_corner[ahead(corner)]
+    while True:
+        p = vertex_behind(corner_vertex, c)
+        star[n] = c
+        ring[n + 1] = p
+        p = p if p != DEAD else y
+        n += p != y
+        n_common += (p != y) & (mark[np.uint32(p)] == stamp)
+        if p == x:
+            break
+        c = next_corner[np.uint32(c)]
+    scratch.tally[RING_V], scratch.tally[RING_ALL], scratch.tally[N_GAPS] = n_v, n, 0
+    return n_v, n - n_v, 2, n_common
+
+
+@cold_part
+def _gather_in_any_order(surface, scratch, corner, v, u, stamp):
+    """The same for vertices on the boundary, or whose corners are in no order."""
+    corner_vertex, next_corner, mark = surface.corner_vertex, surface.next_corner, scratch.mark
+    star, doomed = scratch.lists[STAR], scratch.lists[DOOMED]
     n_v = 0
     n_doomed = 0
     c = corner
@@ -82,6 +141,30 @@ def gather_stars(surface, scratch, corner):
         if c == start:
             break
     return n_v, n_u, n_doomed, n_common
+
+
+@cold_part
+def list_ring(surface, scratch, n_v, n_u):
+    """List the vertices around the faces of STAR, and between which of them there is no face.
+
+    The i-th step of the ring is from its i-th vertex to the next one: along a face, or a gap. Faces
+    that follow one another share a vertex, as they do but for gaps where corners are in order.
+    """
+    star, ring, gaps = scratch.lists[STAR], scratch.ring[0], scratch.ring[1]
+    n_steps = n_gaps = n_steps_v = 0
+    for i in range(n_v + n_u):
+        if i == n_v:
+            n_steps_v = n_steps
+        n, p = others(surface.corner_vertex, star[i])
+        if i > 0 and ring[n_steps] != n:
+            gaps[n_gaps] = n_steps
+            n_gaps += 1
+            n_steps += 1
+        ring[n_steps] = n
+        ring[n_steps + 1] = p
+        n_steps += 1
+    scratch.tally[RING_V] = n_steps_v if n_u > 0 else n_steps
+    scratch.tally[RING_ALL], scratch.tally[N_GAPS] = n_steps, n_gaps
 
 
 @part

@@ -8,7 +8,7 @@ is left in `scratch.point`.
 from tetsimplify.kernels.guards import NO_GUARD, harm, turns_over
 from tetsimplify.kernels.jit import part
 from tetsimplify.kernels.quadrics import reachable_optimum, sum_at, value
-from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE, STAR
+from tetsimplify.kernels.state import CONTRACTIBLE, ERROR, FOLDOVER, PLACE
 
 FREE = -1.0  # no end of the edge has to stay
 
@@ -26,28 +26,27 @@ def fixed_place(surface, v, u):
 
 
 @part
-def find_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
+def find_place(surface, quadrics, scratch, rules, v, u):
     """Find a place that passes the guards: CONTRACTIBLE, or the guard that forbids the last."""
     if quadrics is None:
-        return _first_place(surface, scratch, rules, v, u, n_v, n_u)
-    return _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+        return _first_place(surface, scratch, rules, v, u)
+    return _cheapest_place(surface, quadrics, scratch, rules, v, u)
 
 
 @part
-def _first_place(surface, scratch, rules, v, u, n_v, n_u):
+def _first_place(surface, scratch, rules, v, u):
     """The first of the places of the rules that folds nothing over."""
     fixed = fixed_place(surface, v, u)
-    vertices, corner_vertex, point = surface.vertices, surface.corner_vertex, scratch.point
-    star, cos = scratch.lists[STAR], rules.cos_foldover
+    vertices, point = surface.vertices, scratch.point
     for place in rules.places:
         t = place if fixed == FREE else fixed
         point[PLACE] = t
         for axis in range(3):
             a, b = vertices[v, axis], vertices[u, axis]
             point[axis] = a if t == 0.0 else b if t == 1.0 else a + t * (b - a)
-        if cos <= NO_GUARD:
+        if rules.cos_foldover <= NO_GUARD:
             return CONTRACTIBLE
-        if not turns_over(vertices, corner_vertex, star, n_v, n_u, v, u, point, cos):
+        if not turns_over(surface, scratch, rules, v, u):
             return CONTRACTIBLE
         if fixed != FREE:
             break
@@ -93,7 +92,7 @@ def least_error(q, x, y, z, fixed, rules):
 
 
 @part
-def _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
+def _cheapest_place(surface, quadrics, scratch, rules, v, u):
     """The place of least error, or the cheapest of the places of the rules, that harms nothing."""
     vertices, point = surface.vertices, scratch.point
     q = sum_at(quadrics, vertices, v, u)
@@ -106,7 +105,7 @@ def _cheapest_place(surface, quadrics, scratch, rules, v, u, n_v, n_u):
         point[0], point[1], point[2] = ox + px, oy + py, oz + pz
         if px == x and py == y and pz == z:  # ends stay what they are to the last bit
             point[0], point[1], point[2] = vertices[u, 0], vertices[u, 1], vertices[u, 2]
-        harmed = harm(surface, quadrics, scratch, rules, v, u, n_v, n_u)
+        harmed = harm(surface, quadrics, scratch, rules, v, u)
         if harmed == CONTRACTIBLE or fixed != FREE:
             break
         least = -1.0  # the others in the order of their errors

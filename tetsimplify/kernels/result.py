@@ -3,6 +3,7 @@
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD
+from tetsimplify.kernels.cost import COLUMNS
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place
 
@@ -17,30 +18,55 @@ def count_live_faces(corner_vertex, first, last):
 
 
 @kernel_in_place
-def copy_live_faces(
-    surface, cost, origin, first, last, n, to_corner, to_state, to_verdict, to_cost, to_origin
-):
-    """Copy the live faces from `first` to `last` with all that goes with them, from place n on.
+def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cost, to_origin):
+    """Copy the live ones of the faces from `first` to `last`, but for the links of their corners.
 
     Parameters
     ----------
     surface : Surface
-    cost : float32 (3 m,) or None
+    cost : float32 (4 m,) or None
         Where costs are kept.
     origin : int32 (m,)
-    first, last, n : int
+        Number of each face in the mesh given.
+    begin : int
+        How many live faces come before.
+    place : int32 (m,), out
+        Where each live face goes.
+    to : Surface
+        What they are copied to.
+    to_cost, to_origin
+        The same.
     """
+    n = begin
     for f in range(first, last):
         if surface.corner_vertex[3 * f] == DEAD:
             continue
+        place[f] = n
         for k in range(3):
-            to_corner[3 * n + k] = surface.corner_vertex[3 * f + k]
-            to_verdict[3 * n + k] = surface.verdict[3 * f + k]
-            if cost is not None:
-                to_cost[3 * n + k] = cost[3 * f + k]
-        to_state[n] = surface.face_state[f]
+            to.corner_vertex[3 * n + k] = surface.corner_vertex[3 * f + k]
+            to.verdict[3 * n + k] = surface.verdict[3 * f + k]
+        if cost is not None:
+            for k in range(COLUMNS):
+                to_cost[COLUMNS * n + k] = cost[COLUMNS * f + k]
+        to.face_state[n] = surface.face_state[f]
         to_origin[n] = origin[f]
         n += 1
+
+
+@kernel_in_place
+def copy_links(surface, first, last, place, to):
+    """Link the corners of the live ones of the faces from `first` to `last`, in the same order."""
+    corner_vertex, next_corner = surface.corner_vertex, surface.next_corner
+    for f in range(first, last):
+        if corner_vertex[3 * f] == DEAD:
+            continue
+        n = place[f]
+        for k in range(3):
+            c = np.uint32(next_corner[3 * f + k])
+            while corner_vertex[c] == DEAD:
+                c = np.uint32(next_corner[c])
+            across = c // np.uint32(3)
+            to.next_corner[3 * n + k] = 3 * place[across] + (c - np.uint32(3) * across)
 
 
 @kernel_in_place

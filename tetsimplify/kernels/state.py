@@ -78,8 +78,9 @@ class Scratch(NamedTuple):
     face_mark: np.ndarray  # int32 (m,): stamps of faces
     nodes: np.ndarray  # int32 (3, n + n_loops): what is known of vertices for a while, below
     lists: np.ndarray  # int32 (N_LISTS, m + 2): lists, below
+    ring: np.ndarray  # int32 (2, 2 m + 4): the vertices around the edge in order, see link.py
     point: np.ndarray  # float64: middle of the edge, then the new vertex; and more, below
-    lanes: np.ndarray  # float64 (N_ROWS * LANES,): rows of what is computed side by side
+    lanes: np.ndarray  # float64 (N_ROWS * WIDTH,): rows of what is computed side by side
 
 
 # Places in `Scratch.tally`: what has been done, and what is at hand.
@@ -89,7 +90,8 @@ STAMP, N_STEPS, N_DEFERRED = 5, 6, 7  # last stamp given, steps of region growin
 LENS_STAMP, N_LENSES, CONE = 8, 9, 10  # of the lenses at hand, see lens.py
 STAMP_LIMIT = 11  # stamps are int32; they start anew beyond this
 BLOCK, N_SPARE = 12, 13  # the block at hand, see blocks.py; faces that may still go
-TALLY_SIZE = 14
+RING_V, RING_ALL, N_GAPS = 14, 15, 16  # steps of the ring, see link.py
+TALLY_SIZE = 17
 
 # In `Scratch.point`: parameter of the new vertex along its edge; quadric error at it; factor for
 # the shapes of the triangles there; cost of it all; how far vertices may be removed, squared;
@@ -98,8 +100,8 @@ PLACE, ERROR, FACTOR, COST, REMOVAL2, MAX_COST, MAX_PRICE = 3, 4, 5, 6, 7, 8, 9
 POINT_SIZE = 10
 
 # So many edges, or faces around an edge, are computed side by side, in the wide registers of the
-# processor: a multiple of what they hold. Rows of `Scratch.lanes` are as long.
-LANES, N_ROWS = 16, 16
+# processor: a multiple of what they hold. Rows of `Scratch.lanes` are WIDTH apart.
+LANES, WIDTH, N_ROWS = 16, 24, 16
 AT_ONCE = 256  # faces whose edges are ranked before the first of them is contracted
 
 # Rows of `Scratch.nodes`.
@@ -119,5 +121,5 @@ STATUS = 14  # of each lens
 VOTES, LENGTHS_A, LENGTHS_B = 15, 16, 17  # of the common neighbours, see outer.py
 DEFERRED = 18  # faces with a blocked edge, put off to the end of the sweep
 WAITING = 19  # faces that a sweep has to look at
-PENDING = 20  # corners where edges begin that are to be ranked
-N_LISTS = 21
+PENDING = 20  # edges that are to be ranked: where their costs are, then both their vertices
+N_LISTS = 23

@@ -135,7 +135,7 @@ def _link_range(corner_vertex, first, last, first_corner, next_corner):
 def survey_inside(corner_vertex, first, last, found, arcs, slots):
     """Link the corners of a range of vertices, and survey those that are inside the surface.
 
-    The circular lists are those of `corners.link_corners`.
+    Their circular lists are in order.
 
     Parameters
     ----------
@@ -144,11 +144,11 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         The range.
     found : Survey
         Filled for the vertices of the range and their corners.
-    arcs : int32 (2, MOST_ARCS)
+    arcs : int32 (3, MOST_ARCS)
         Working memory.
-    slots : int64 (2, SLOTS)
+    slots : int64 (3, SLOTS)
         Working memory, filled with -1. Where the tail of an arc is looked up: for which vertex and
-        tail the entry was made last, and the head.
+        tail the entry was made last, the head, and the corner.
 
     Returns
     -------
@@ -161,8 +161,8 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
     """
     first_corner, next_corner, left = found.first_corner, found.next_corner, found.left
     component, euler = found.component, found.euler
-    tail, head = arcs[0], arcs[1]
-    entry, successor = slots[0], slots[1]
+    tail, head, corners = arcs[0], arcs[1], arcs[2]
+    entry, successor, entered = slots[0], slots[1], slots[2]
     last_slot = SLOTS - 1
     _link_range(corner_vertex, first, last, first_corner, next_corner)
     n_edges = n_left = longest = 0
@@ -182,8 +182,9 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         while True:
             a, b = others(corner_vertex, corner)
             i = n_arcs & (MOST_ARCS - 1)
-            tail[i], head[i] = a, b
-            entry[a & last_slot], successor[a & last_slot] = stamp | a, b
+            tail[i], head[i], corners[i] = a, b, corner
+            slot = a & last_slot
+            entry[slot], successor[slot], entered[slot] = stamp | a, b, corner
             n_arcs += 1
             # edges and faces count at their lowest vertex
             n_edges_here += a > v
@@ -204,12 +205,18 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         begin = np.int64(head[0])
         w = begin
         n_followed = 0
+        previous = latest
         while n_followed < n_arcs <= MOST_ARCS and entry[w & last_slot] == stamp | w:
+            next_corner[previous] = entered[w & last_slot]
+            previous = next_corner[previous]
             w = successor[w & last_slot]
             n_followed += 1
             if w == begin:
                 break
         is_cycle = n_followed == n_arcs and w == begin and n_arcs > 2
+        if not is_cycle and n_arcs <= MOST_ARCS:
+            for i in range(n_arcs):  # as they were
+                next_corner[corners[i]] = corners[i + 1 if i + 1 < n_arcs else 0]
 
         # Two neighbours that follow one another in the link have an edge of their own. So of lower
         # ones that do, one is joined here, and the others are joined to that elsewhere.
@@ -285,6 +292,8 @@ def survey_rest(corner_vertex, found, rest, arcs, slot):
         for i in range(n_arcs):
             n_faces_here += tail[i] > v and head[i] > v
             n_edges_here += tail[i] > v
+        if kind != IRREGULAR and n_arcs == n_corners:
+            _put_in_order(next_corner, corners, n_arcs, successor, begin, end)
         if kind == PATH:
             n_edges_here += head[end] > v
             n_boundary += join_loop(loop, v, tail[begin]) + join_loop(loop, v, head[end])
@@ -301,6 +310,16 @@ def survey_rest(corner_vertex, found, rest, arcs, slot):
             if kind != CYCLE and head[i] < v:
                 join_component(component, euler, v, head[i])
     return n_edges, n_boundary, n_degenerate, n_irregular
+
+
+@part
+def _put_in_order(next_corner, corners, n_arcs, successor, begin, end):
+    """Link the corners of a vertex in the order in which their arcs follow one another."""
+    i = begin
+    for _ in range(n_arcs - 1):
+        next_corner[corners[i]] = corners[successor[i]]
+        i = successor[i]
+    next_corner[corners[i]] = corners[begin]
 
 
 @part

@@ -10,7 +10,16 @@ import numpy as np
 
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.cost import cheapest, edge_costs, rank_faces, without
+from tetsimplify.kernels.cost import (
+    COLUMNS,
+    cheapest,
+    costs_of,
+    edge_costs,
+    least_cost,
+    note_least,
+    rank_faces,
+    without,
+)
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
 from tetsimplify.kernels.state import (
     AT_ONCE,
@@ -112,6 +121,18 @@ def sweep(surface, quadrics, watch, scratch, rules, listed, blocks, n_sweeps, co
 @inlined
 def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, colour, retry):
     """Sweep once over the faces listed from `first` to `last`."""
+    n_contracted = 0
+    for begin in range(first, last, AT_ONCE):
+        end = min(begin + AT_ONCE, last)
+        n_contracted += _sweep_run(
+            surface, quadrics, watch, scratch, rules, listed, begin, end, colour, retry
+        )
+    return n_contracted
+
+
+@inlined
+def _sweep_run(surface, quadrics, watch, scratch, rules, listed, first, last, colour, retry):
+    """Sweep once over at most AT_ONCE faces."""
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
         f = listed[i]
@@ -136,7 +157,9 @@ def _sweep_block(surface, quadrics, watch, scratch, rules, listed, first, last, 
         while least < rules.max_length2:
             corner = 3 * f + k
             if state != BLOCKED or surface.verdict[corner] != OBSTRUCTED:
-                outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
+                outcome = contract_simple(
+                    surface, quadrics, watch, scratch, rules, None, corner, colour
+                )
                 if outcome == CONTRACTIBLE:
                     n_contracted += 1
                     is_nested = is_outside = False
@@ -166,8 +189,8 @@ def sweep_ranked(
 
     Parameters
     ----------
-    cost : float32 (3 m,)
-        Of the edge that begins at each corner.
+    cost : float32 (4 m,)
+        Rows of costs, see cost.py.
     thresholds : float64 (n_sweeps,)
     lenience : float
         So many times the threshold an edge may cost together with the factor for the shapes.
@@ -222,19 +245,15 @@ def _sweep_run_ranked(
     max_cost = scratch.point[MAX_COST]
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
-        f = listed[i]
-        state = surface.face_state[f]
-        is_cheap = min(cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]) < max_cost
-        is_stale = (state != RANKED) & (state != SETTLED) & (not _is_touched(state, colour))
-        waiting[n_waiting] = f
-        n_waiting += is_stale | ((state == RANKED) & is_cheap)
-    rank_faces(surface, quadrics, rules, cost, scratch, n_waiting)
+        waiting[n_waiting] = listed[i]
+        n_waiting += least_cost(cost, listed[i]) < max_cost
+    rank_faces(surface, quadrics, rules, cost, scratch, n_waiting, colour)
     n_contracted = 0
     for i in range(n_waiting):
         f = waiting[i]
         if surface.face_state[f] != RANKED:
             continue
-        costs = cost[3 * f], cost[3 * f + 1], cost[3 * f + 2]
+        costs = costs_of(cost, f)
         least, k = cheapest(costs)
         if least >= max_cost:
             continue
@@ -244,12 +263,14 @@ def _sweep_run_ranked(
         is_nested = False
         while least < max_cost:
             corner = 3 * f + k
-            outcome = contract_simple(surface, quadrics, watch, scratch, rules, corner, colour)
+            outcome = contract_simple(
+                surface, quadrics, watch, scratch, rules, cost, corner, colour
+            )
             if outcome == CONTRACTIBLE:
                 n_contracted += 1
                 is_nested = False
                 break
-            _put_off(surface, scratch, rules, cost, corner, outcome)
+            _put_off(surface, scratch, rules, cost, f, k, outcome)
             is_nested |= outcome == NESTED
             costs = without(costs, k)
             least, k = cheapest(costs)
@@ -259,24 +280,19 @@ def _sweep_run_ranked(
 
 
 @part
-def _is_touched(state, colour):
-    """Whether a face has been touched in the sweep of a colour, where costs are kept."""
-    stale = STALE_EVEN if colour == MOVED_EVEN else STALE_ODD
-    return (state == stale) | ((state >= colour) & (state < colour + 3))
-
-
-@part
-def _put_off(surface, scratch, rules, cost, corner, outcome):
+def _put_off(surface, scratch, rules, cost, f, k, outcome):
     """Note why an edge is refused, and the threshold that it waits for."""
     if outcome == OUTSIDE:
         return
-    surface.verdict[corner] = outcome
+    surface.verdict[3 * f + k] = outcome
+    place = COLUMNS * f + k
     if outcome == TOO_DEAR:
-        cost[corner] = scratch.point[COST]
+        cost[place] = scratch.point[COST]
     elif outcome == OBSTRUCTED or outcome == ERROR_BOUND:
-        cost[corner] = np.inf  # until an end is contracted
+        cost[place] = np.inf  # until an end is contracted
     elif outcome != NESTED or rules.blocked == SKIP:  # nested ones are decided in `unblock`
-        cost[corner] = RAISE * scratch.point[MAX_COST]
+        cost[place] = RAISE * scratch.point[MAX_COST]
+    note_least(cost, f)
 
 
 @kernel_in_place
@@ -311,11 +327,8 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, whole, colour
         costs = edge_costs(surface.vertices, surface.corner_vertex, f)
         limit = rules.max_length2
         if cost is not None and commit:
-            costs = (
-                np.float64(cost[3 * f]),
-                np.float64(cost[3 * f + 1]),
-                np.float64(cost[3 * f + 2]),
-            )
+            x, y, z = costs_of(cost, f)
+            costs = np.float64(x), np.float64(y), np.float64(z)
             limit = scratch.point[MAX_COST]
         least, k = cheapest(costs)
         while least < limit:
@@ -323,7 +336,7 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, whole, colour
             if surface.verdict[corner] == wanted:
                 _renew_stamps(scratch)
                 outcome = contract_nested(
-                    surface, quadrics, watch, scratch, rules, outer, corner, colour, commit
+                    surface, quadrics, watch, scratch, rules, cost, outer, corner, colour, commit
                 )
                 if commit and outcome == CONTRACTIBLE:
                     n_contracted += 1
@@ -331,7 +344,7 @@ def unblock(surface, quadrics, watch, scratch, rules, cost, outer, whole, colour
                 if commit or outcome == OBSTRUCTED:
                     surface.verdict[corner] = outcome
                 if cost is not None and commit:
-                    _put_off(surface, scratch, rules, cost, corner, outcome)
+                    _put_off(surface, scratch, rules, cost, f, k, outcome)
             costs = without(costs, k)
             least, k = cheapest(costs)
     scratch.tally[N_DEFERRED] = 0
