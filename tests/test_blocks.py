@@ -15,6 +15,7 @@ import tetsimplify
 from test_simplify import assert_maps_fit, assert_same_topology
 from tetsimplify import blocks, kernels
 from tetsimplify.arrays import as_mesh
+from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_lengths
 from tetsimplify.engine import Engine
 from tetsimplify.locality import by_locality
@@ -127,7 +128,7 @@ def test_shuffled_meshes_are_put_in_order(small_blocks):
     shuffled = np.empty_like(vertices)
     shuffled[place] = vertices
     mesh = as_mesh(shuffled, place[faces][rng.permutation(len(faces))])
-    arranged = by_locality(mesh)
+    arranged = by_locality(mesh, Crew(2))
     assert np.array_equal(mesh.vertices[arranged.vertex_origin], arranged.mesh.vertices)
     assert np.array_equal(
         arranged.vertex_origin[arranged.vertex_place], np.arange(len(mesh.vertices))

@@ -12,6 +12,7 @@ from tetsimplify.errors import OptionError
 from tetsimplify.options import Progress
 
 Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 
 class Crew:
@@ -73,6 +74,17 @@ class Crew:
                     pool.shutdown(cancel_futures=True)
         self._n_done += 1
         return results
+
+    def do_both(
+        self, one: Callable[[], Result], other: Callable[[], Other]
+    ) -> tuple[Result, Other]:
+        """Do two different things, at the same time where there are threads for it."""
+        if self.n_threads < 2:
+            return one(), other()
+        with ThreadPoolExecutor(1) as pool:
+            waiting = pool.submit(other)
+            done = one()
+            return done, waiting.result()
 
     def _tell(self, n_done: float) -> None:
         if self._progress is not None:

@@ -60,7 +60,7 @@ def _arrange(mesh: Mesh, options: Options, crew: Crew) -> tuple[Arrangement, blo
     cells = blocks.runs(mesh, crew) if in_runs else None
     if cells is not None:
         return as_given(mesh), cells
-    arranged = by_locality(mesh)
+    arranged = by_locality(mesh, crew)
     return arranged, blocks.two_ways(arranged.mesh, crew)
 
 
@@ -138,6 +138,7 @@ class Engine:
         n_coned = n + self.topology_before.n_boundary_loops
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
+        self._idle: SimpleQueue[Scratch] = SimpleQueue()  # what tasks have left for the next ones
 
     @property
     def n_faces(self) -> int:
@@ -280,10 +281,7 @@ class Engine:
 
         if divided:
             all_blocks = self._divide()
-            n_cheaper = kernels.cost.count_cheaper(
-                self._cost, self._listed, all_blocks, thresholds[-1]
-            )
-            blocks.allot(all_blocks, self._n_spare, n_cheaper)
+            blocks.allot(all_blocks, self._n_spare, self._count_cheaper(all_blocks, thresholds[-1]))
             n_contracted = self._share(task, all_blocks, progress, (done, done))
         else:
             n_contracted = task(self._surface, self._scratch, blocks.whole(n_faces, self._n_spare))
@@ -298,16 +296,26 @@ class Engine:
         self._change_colour()
         return n_contracted
 
+    def _count_cheaper(self, some: blocks.Blocks, threshold: float) -> NDArray[np.int64]:
+        """How many edges of each block cost less than a threshold."""
+        n_cheaper = np.zeros(len(some), np.int64)
+
+        def count(part: slice) -> None:
+            kernels.cost.count_cheaper(
+                self._cost, self._listed, some[part], threshold, n_cheaper[part]
+            )
+
+        self._crew.share(count, len(some), blocks.AT_ONCE)
+        return n_cheaper
+
     def _change_colour(self) -> None:
         """Take the other colour for the faces that are touched next, where costs are kept."""
         self._colour = kernels.state.MOVED_EVEN + kernels.state.MOVED_ODD - self._colour
 
     def negligible_cost(self) -> float:
         """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
-        vertices = self._surface.vertices
-        nothing2 = (
-            NOTHING**2 * float((np.ptp(vertices, axis=0) ** 2).sum()) if self.n_faces else 0.0
-        )
+        low, high = kernels.order.bounds(self._surface.vertices)
+        nothing2 = NOTHING**2 * float(((high - low) ** 2).sum()) if self.n_faces else 0.0
         if self._quadrics is None or self.rules.by_length:
             return nothing2
         areas = self._quadrics.origin[:, kernels.quadrics.AREA]  # every one three times
@@ -374,13 +382,14 @@ class Engine:
         ends = all_blocks[at_once - 1 :: at_once, 1].tolist()
         ends = [*ends, int(all_blocks[-1, 1])]
         room = max(end - begin for begin, end in pairwise([0, *ends]))
-        idle: SimpleQueue[Scratch] = SimpleQueue()
+        idle = self._idle
 
         def borrow() -> Scratch:
             try:
-                return idle.get_nowait()
+                own = idle.get_nowait()
             except Empty:
                 return start_scratch(room, len(scratch.mark), 0)
+            return own if len(own.face_mark) >= room else start_scratch(room, len(own.mark), 0)
 
         def do(part: slice) -> _Done:
             own, some = borrow(), all_blocks[part]
@@ -435,19 +444,30 @@ class Engine:
         surface, place = self._surface, self._arranged.vertex_place
         order = self._order_given()
         faces = surface.corner_vertex.reshape(-1, 3)[order]
-        number = np.empty(len(surface.merged_into), np.int32)
-        merged_into = surface.merged_into.copy()  # whose paths are shortened
-        n_used = kernels.result.number_vertices(surface.corner_vertex, place, merged_into, number)
+        number, n_used = self._new_numbers()
         vertices = np.empty((n_used, 3))
         kernels.result.copy_vertices(
-            surface.vertices, number, merged_into, faces.reshape(-1), vertices
+            surface.vertices, number, surface.merged_into, faces.reshape(-1), vertices
         )
         shortest, longest = edge_extremes(Mesh(vertices, faces), self._crew)
         stop = self._stop(reasons, longest)
         return Result(
             *(vertices, faces, number[place], self._face_origin[order], number[edges], reasons),
-            *(shortest, stop, self._vertex_errors(number)),
+            *(shortest, stop, self._vertex_errors(number, n_used)),
         )
+
+    def _new_numbers(self) -> tuple[NDArray[np.int32], int]:
+        """The new number of what each vertex was merged into, -1 where that is gone; how many."""
+        surface, place = self._surface, self._arranged.vertex_place
+        n = len(place)
+        number, root = np.full(n, -1, np.int32), np.empty(n, np.int32)
+        n_used = kernels.result.number_vertices(surface.corner_vertex, place, number)
+
+        def follow(part: slice) -> None:
+            kernels.result.follow_merges(surface.merged_into, number, part.start, part.stop, root)
+
+        self._crew.share(follow, n, blocks.PART)
+        return root, int(n_used)
 
     def _order_given(self) -> NDArray[np.int32]:
         """The live faces in the order in which they were given."""
@@ -458,16 +478,13 @@ class Engine:
         place[origin] = np.arange(len(origin), dtype=np.int32)
         return place[place >= 0]
 
-    def _vertex_errors(self, number: NDArray[np.int32]) -> NDArray[np.float64]:
+    def _vertex_errors(self, number: NDArray[np.int32], n_used: int) -> NDArray[np.float64]:
         """The quadric errors of the vertices that are left, as distances."""
         if self._quadrics is None:
             return np.empty(0)
-        place, is_used = self._arranged.vertex_place, number >= 0
-        is_left = (self._surface.merged_into == np.arange(len(number))) & is_used
-        left = place[is_left[place]]
-        weight = self._quadrics.matrix[left][:, [0, 3, 5]].sum(axis=1)
-        error2 = self._quadrics.linear[left, kernels.quadrics.CONSTANT]
-        errors: NDArray[np.float64] = np.sqrt(error2 / np.where(weight > 0.0, weight, 1.0))
+        errors = np.empty(n_used)
+        merged_into = self._surface.merged_into
+        kernels.quadrics.vertex_errors(self._quadrics, merged_into, number, errors)
         return errors
 
     def _stop(self, reasons: NDArray[np.str_], longest_edge: float) -> str:

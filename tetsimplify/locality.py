@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
+from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
 
 
@@ -35,7 +36,7 @@ def as_given(mesh: Mesh) -> Arrangement:
     return Arrangement(Mesh(mesh.vertices.copy(), mesh.faces.copy()), vertices, vertices, faces)
 
 
-def by_locality(mesh: Mesh) -> Arrangement:
+def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
     """Vertices along a Z-order curve (Morton 1966), faces by their first vertices.
 
     So a run of faces is a compact piece of the surface, which fits a cache and has few edges in
@@ -47,6 +48,13 @@ def by_locality(mesh: Mesh) -> Arrangement:
     vertex_origin = kernels.order.sort_vertices(mesh.vertices, low, scale)
     vertex_place = np.empty_like(vertex_origin)
     vertex_place[vertex_origin] = np.arange(len(vertex_origin), dtype=np.int32)
-    face_origin, faces = kernels.order.sort_faces(mesh.faces, vertex_place)
-    arranged = Mesh(mesh.vertices.take(vertex_origin, axis=0), faces)
-    return Arrangement(arranged, vertex_origin, vertex_place, face_origin)
+
+    def sort_faces() -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        face_origin, faces = kernels.order.sort_faces(mesh.faces, vertex_place)
+        return face_origin, faces
+
+    def copy_vertices() -> NDArray[np.float64]:
+        return mesh.vertices.take(vertex_origin, axis=0)
+
+    (face_origin, faces), vertices = crew.do_both(sort_faces, copy_vertices)
+    return Arrangement(Mesh(vertices, faces), vertex_origin, vertex_place, face_origin)

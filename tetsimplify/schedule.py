@@ -17,10 +17,9 @@ from tetsimplify.engine import Engine
 from tetsimplify.options import Progress
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-SHARES = (0.1, 0.02)  # of the edges are below the next threshold; the second near the end
-NEAR_END = 2.0  # times the faces asked for are left
-LENIENCE = 2.0  # while there are more than LENIENT times the faces asked for: triangles that become
-LENIENT = 4.0  # worse have time to become better again
+SHARES = (0.2, 0.1, 0.02)  # of the edges are below the next threshold: far from the end, then near
+FAR, NEAR = 4.0, 2.0  # times the faces asked for are left
+LENIENCE = 2.0  # far from the end: triangles that become worse have time to become better again
 SUCCESS, LEAST_SUCCESS = 0.5, 0.2  # part of the edges below a threshold that can be contracted
 N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
 
@@ -70,7 +69,7 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
         done = (n_given - engine.n_faces) / max(1, n_given - engine.min_faces)
         n_contracted = engine.sweep_ranked(
             *(thresholds, progress, done),
-            lenience=LENIENCE if engine.n_faces > LENIENT * engine.min_faces else 1.0,
+            lenience=LENIENCE if is_far_from_end(engine) else 1.0,
             divided=engine.is_divided and not n_barren,
         )
         n_barren = 0 if n_contracted else n_barren + 1
@@ -84,9 +83,14 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
     engine.rank()
 
 
+def is_far_from_end(engine: Engine) -> bool:
+    """Whether most of the faces that are left have still to go."""
+    return engine.n_faces > FAR * engine.min_faces
+
+
 def is_near_end(engine: Engine) -> bool:
     """Whether at most half of the faces that are left have still to go."""
-    return engine.n_faces <= NEAR_END * engine.min_faces
+    return engine.n_faces <= NEAR * engine.min_faces
 
 
 def next_thresholds(engine: Engine, least: float, n_barren: int = 0, success: float = 1.0) -> Round:
@@ -110,7 +114,7 @@ def next_thresholds(engine: Engine, least: float, n_barren: int = 0, success: fl
     """
     costs = engine.sample_of_costs()
     n_faces, min_faces = engine.n_faces, engine.min_faces
-    share = SHARES[is_near_end(engine)]
+    share = SHARES[0 if is_far_from_end(engine) else 2 if is_near_end(engine) else 1]
     n_edges = 1.5 * n_faces
     most = 0.5 * (n_faces - min_faces) / (success * n_edges) if min_faces else 1.0
     shares = 1.0 - (1.0 - share) ** np.arange(1, N_SWEEPS + 1)

@@ -144,9 +144,9 @@ def start_quadrics(
     sharp = -1.0
     if options.feature_angle is not None:
         sharp = math.cos(math.radians(options.feature_angle))
-    if sharp > -1.0 or surface.loop_size.any():
-        weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
-        kernels.quadrics.add_creases(surface, quadrics.matrix, *weights, sharp)
+    begins = np.flatnonzero((surface.loop >= 0) | (sharp > -1.0)).astype(np.int32)
+    weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
+    kernels.quadrics.add_creases(surface, first_corner, begins, quadrics.matrix, *weights, sharp)
     return quadrics
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetsimplify.kernels.geometry import squared_length
-from tetsimplify.kernels.jit import kernel, kernel_in_place, part
+from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.quadrics import (
     CONSTANT,
@@ -239,15 +239,15 @@ def rank(surface, quadrics, rules, cost, scratch, first, last, step):
         rank_faces(surface, quadrics, rules, cost, scratch, n, -1)
 
 
-@kernel
-def count_cheaper(cost, listed, blocks, threshold):
-    """How many edges of each block cost less than a threshold."""
-    n_cheaper = np.zeros(len(blocks), np.int64)
+@kernel_in_place
+def count_cheaper(cost, listed, blocks, threshold, n_cheaper):
+    """Count the edges of each block that cost less than a threshold."""
     for b in range(len(blocks)):
+        n = 0
         for i in range(blocks[b, 0], blocks[b, 1]):
             x, y, z = costs_of(cost, listed[i])
-            n_cheaper[b] += np.int64(x < threshold) + (y < threshold) + (z < threshold)
-    return n_cheaper
+            n += np.int64(x < threshold) + np.int64(y < threshold) + np.int64(z < threshold)
+        n_cheaper[b] = n
 
 
 @part

@@ -177,6 +177,26 @@ def merge_quadrics(surface, quadrics, scratch, v, u):
         origin[v, k] += origin[u, k]
 
 
+@kernel_in_place
+def vertex_errors(quadrics, merged_into, number, errors):
+    """Root mean squared distances of the vertices that are left from the planes of their quadrics.
+
+    Parameters
+    ----------
+    merged_into : int32 (n,)
+        Each vertex that was not merged has its own number there.
+    number : int32 (n,)
+        New numbers of the vertices, -1 where they are not in use.
+    errors : float64, out
+        In the new order.
+    """
+    for v in range(number.size):
+        if merged_into[v] == v and number[v] >= 0:
+            weight_v = weight(quadrics, v)
+            error2 = quadrics.linear[v, CONSTANT]
+            errors[number[v]] = np.sqrt(error2 / weight_v) if weight_v > 0.0 else 0.0
+
+
 @part
 def _add_plane(matrix, v, scale, x, y, z):
     """Add the plane through v with a normal of any length; scale times its square is the weight."""
@@ -247,11 +267,19 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
 
 
 @kernel_in_place
-def add_creases(surface, matrix, unit, boundary_weight, feature_weight, cos_feature):
+def add_creases(
+    surface, first_corner, begins, matrix, unit, boundary_weight, feature_weight, cos_feature
+):
     """Hold boundary and feature edges by planes through them, upright on their faces.
 
     Parameters
     ----------
+    first_corner : int32 (n,)
+        A corner of each vertex, -1 where it has none.
+    begins : int32 (k,)
+        Vertices where such edges may begin.
+    matrix : float64 (n, 8)
+        Of the quadrics.
     unit : float
         Of the weights.
     boundary_weight, feature_weight : float
@@ -260,27 +288,47 @@ def add_creases(surface, matrix, unit, boundary_weight, feature_weight, cos_feat
         Edges whose faces have normals with a smaller cosine are features; -1 for none.
     """
     vertices, corner_vertex, loop = surface.vertices, surface.corner_vertex, surface.loop
-    for corner in range(corner_vertex.size):
-        a, b = corner_vertex[corner], corner_vertex[ahead(corner)]
-        if cos_feature <= -1.0 and (loop[a] < 0 or loop[a] != loop[b]):
-            continue
-        x, y, z = _area_vector(vertices, a, b, corner_vertex[behind(corner)])
-        square = x * x + y * y + z * z
-        if square == 0.0:
-            continue
-        scale = boundary_weight / (unit * square)
-        across = face_across(corner_vertex, surface.next_corner, corner)
-        if across >= 0:
-            first = 3 * across
-            ox, oy, oz = _area_vector(
-                vertices, corner_vertex[first], corner_vertex[first + 1], corner_vertex[first + 2]
-            )
-            cosine = x * ox + y * oy + z * oz
-            if cosine >= cos_feature * np.sqrt(square * (ox * ox + oy * oy + oz * oz)):
-                continue
-            scale = feature_weight / (unit * square)
-        ex = vertices[b, 0] - vertices[a, 0]
-        ey = vertices[b, 1] - vertices[a, 1]
-        ez = vertices[b, 2] - vertices[a, 2]
-        for v in (a, b):
-            _add_plane(matrix, v, scale, y * ez - z * ey, z * ex - x * ez, x * ey - y * ex)
+    for a in begins:
+        corner = first_corner[a]
+        while corner >= 0:
+            b = corner_vertex[ahead(corner)]
+            if cos_feature > -1.0 or (loop[a] >= 0 and loop[a] == loop[b]):
+                x, y, z = _area_vector(vertices, a, b, corner_vertex[behind(corner)])
+                scale = _crease_weight(
+                    surface, corner, x, y, z, boundary_weight, feature_weight, cos_feature
+                )
+                if scale > 0.0:
+                    ex = vertices[b, 0] - vertices[a, 0]
+                    ey = vertices[b, 1] - vertices[a, 1]
+                    ez = vertices[b, 2] - vertices[a, 2]
+                    upright = y * ez - z * ey, z * ex - x * ez, x * ey - y * ex
+                    _add_plane(matrix, a, scale / unit, *upright)
+                    _add_plane(matrix, b, scale / unit, *upright)
+            corner = surface.next_corner[corner]
+            if corner == first_corner[a]:
+                break
+
+
+@part
+def _crease_weight(surface, corner, x, y, z, boundary_weight, feature_weight, cos_feature):
+    """Weight of the edge that begins at a corner for an upright vector of its length by x, y, z.
+
+    0 where it is neither on a boundary nor a feature, or its face has no normal.
+    """
+    corner_vertex = surface.corner_vertex
+    square = x * x + y * y + z * z
+    if square == 0.0:
+        return 0.0
+    across = face_across(corner_vertex, surface.next_corner, corner)
+    if across < 0:
+        return boundary_weight / square
+    first = 3 * across
+    ox, oy, oz = _area_vector(
+        surface.vertices,
+        corner_vertex[first],
+        corner_vertex[first + 1],
+        corner_vertex[first + 2],
+    )
+    cosine = x * ox + y * oy + z * oz
+    is_sharp = cosine < cos_feature * np.sqrt(square * (ox * ox + oy * oy + oz * oz))
+    return feature_weight / square if is_sharp else 0.0

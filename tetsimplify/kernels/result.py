@@ -70,25 +70,16 @@ def copy_links(surface, first, last, place, to):
 
 
 @kernel_in_place
-def number_vertices(corner_vertex, visit, merged_into, number):
-    """Number the vertices that faces use, and tell every vertex its number.
+def number_vertices(corner_vertex, visit, number):
+    """Number the vertices that faces use; return how many there are.
 
     Parameters
     ----------
     visit : int32 (n,)
         The vertices in the order in which they get their numbers.
-    merged_into : int32 (n,)
-        Vertex that each one was merged into, itself where it was not, -1 where removed.
-    number : int32 (n,), out
-        New number of each vertex, or of what it was merged into; -1 where that is gone.
-
-    Returns
-    -------
-    int
-        Number of vertices in use.
+    number : int32 (n,)
+        Filled with -1. Receives the number of each vertex in use.
     """
-    for v in range(number.size):
-        number[v] = -1
     for corner in range(corner_vertex.size):
         number[corner_vertex[corner]] = 0
     n = 0
@@ -96,18 +87,28 @@ def number_vertices(corner_vertex, visit, merged_into, number):
         if number[v] == 0:
             number[v] = n
             n += 1
-    for v in range(number.size):
-        root = v
-        while merged_into[root] >= 0 and merged_into[root] != root:
-            root = merged_into[root]
-        target = root if merged_into[root] >= 0 else -1
-        w = v
-        while w != root:  # shorten the path for those who come later
-            following = merged_into[w]
-            merged_into[w] = target
-            w = following
-        number[v] = number[root] if target >= 0 else -1
     return n
+
+
+@kernel_in_place
+def follow_merges(merged_into, number, first, last, of_target):
+    """Tell vertices the number of what they were merged into; -1 where that is gone.
+
+    Parameters
+    ----------
+    merged_into : int32 (n,)
+        Vertex that each one was merged into, itself where it was not, -1 where removed.
+    number : int32 (n,)
+        Of the vertices in use.
+    first, last : int
+        Which vertices.
+    of_target : int32 (n,), out
+    """
+    for v in range(first, last):
+        w = v
+        while merged_into[w] >= 0 and merged_into[w] != w:
+            w = merged_into[w]
+        of_target[v] = number[w] if merged_into[w] >= 0 else -1
 
 
 @kernel_in_place

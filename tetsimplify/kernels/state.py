@@ -101,8 +101,8 @@ POINT_SIZE = 10
 
 # So many edges, or faces around an edge, are computed side by side, in the wide registers of the
 # processor: a multiple of what they hold. Rows of `Scratch.lanes` are WIDTH apart.
-LANES, WIDTH, N_ROWS = 16, 24, 16
-AT_ONCE = 256  # faces whose edges are ranked before the first of them is contracted
+LANES, WIDTH, N_ROWS = 8, 16, 16
+AT_ONCE = 2**11  # faces whose edges are ranked before the first of them is contracted
 
 # Rows of `Scratch.nodes`.
 SLOT = 0  # sparse set: place of a vertex in some list
