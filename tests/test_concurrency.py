@@ -69,11 +69,11 @@ def test_processes_that_compile_at_once_share_one_cache(tmp_path):
 def test_one_thread_starts_no_others(monkeypatch):
     """Nor does what is called on the way, such as the proof of a distance."""
 
-    def refuse(*_):
+    def refuse(*_, **__):
         raise AssertionError("a thread was started")
 
     mesh = meshes.icosphere(3)
-    monkeypatch.setattr("tetsimplify.crew.ThreadPoolExecutor", refuse)
+    monkeypatch.setattr("tetsimplify.crew.Thread", refuse)
     monkeypatch.setattr("tetsimplify.distance.AT_ONCE", 50)
     tetsimplify.surface_distance(mesh, mesh, threads=1)
     tetsimplify.simplify(*mesh, max_error=0.1, threads=1)

@@ -50,6 +50,16 @@ class Cells(NamedTuple):
     """Blocks in a task for a thread."""
 
 
+class Division(NamedTuple):
+    """A surface divided into blocks."""
+
+    blocks: Blocks
+    vertex_block: NDArray[np.int32]
+    """Shape (n,): the block that has all faces of each vertex, or SHARED."""
+    listed: NDArray[np.int32]
+    """Shape (m,): the faces block by block."""
+
+
 def two_ways(mesh: Mesh, crew: Crew) -> Cells:
     """Cells of a mesh whose faces are in the order of a Z-order curve.
 
@@ -76,19 +86,22 @@ def two_ways(mesh: Mesh, crew: Crew) -> Cells:
     return Cells((_by_order(m), shifted), counts, FACES, (FACES, FACES), AT_ONCE)
 
 
-def runs(mesh: Mesh, crew: Crew) -> Cells | None:
+def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division] | None:
     """Cells of a mesh as it is given: its blocks are runs of faces, which are shifted by half.
 
-    None where faces that follow one another lie apart, so that much would be between the runs.
+    With the division in the first way. None where faces that follow one another lie apart, so that
+    much would be between the runs.
     """
     m = len(mesh.faces)
     by_order, n_cells = _by_order(m), m // CELL + 1
     run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
     cells = Cells((by_order, by_order), (n_cells, n_cells), run, (run, run // 2), 1)
-    vertex_block = np.zeros(len(mesh.vertices), np.int32)
-    divide(cells, 0, mesh.faces.reshape(-1), vertex_block, np.empty(m, np.int32), crew)
+    vertex_block, listed = np.zeros(len(mesh.vertices), np.int32), np.empty(m, np.int32)
+    blocks = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, listed, crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
-    return cells if n_shared <= MOST_SHARED * len(vertex_block) else None
+    if n_shared > MOST_SHARED * len(vertex_block):
+        return None
+    return cells, Division(blocks, vertex_block, listed)
 
 
 def _by_order(n_faces: int) -> NDArray[np.int32]:
@@ -106,16 +119,17 @@ def copy_live(
     begin : ndarray, shape (n_parts + 1,), int64
         Where the live faces of each part of PART faces begin.
     """
-    live = np.empty((2, begin[-1]), np.int32)
+    ways = cells.of_faces[:1] if cells.of_faces[0] is cells.of_faces[1] else cells.of_faces
+    live = np.empty((len(ways), begin[-1]), np.int32)
 
     def copy(part: slice) -> None:
         at = begin[part.start // PART]
-        for way in range(2):
-            of_faces = cells.of_faces[way]
+        for way, of_faces in enumerate(ways):
             kernels.blocks.copy_cells(corner_vertex, of_faces, part.start, part.stop, at, live[way])
 
     crew.share(copy, len(corner_vertex) // 3, PART)
-    return cells._replace(of_faces=(live[0], live[1]))
+    first, last = live[0], live[-1]
+    return cells._replace(of_faces=(first, first if len(ways) == 1 else last))
 
 
 def divide(

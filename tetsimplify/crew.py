@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from itertools import count
+from threading import Thread
 from typing import TypeVar
 
 from tetsimplify.errors import OptionError
@@ -60,20 +61,36 @@ class Crew:
         self._n_done = 0
 
     def share(self, task: Callable[[slice], Result], n_items: int, at_once: int) -> list[Result]:
-        """Do a task for so many items at once; return what comes of each part, in their order."""
+        """Do a task for so many items at once; return what comes of each part, in their order.
+
+        The thread that asks for it does its share, so that no processor waits for a new thread.
+        """
         parts = [slice(k, min(k + at_once, n_items)) for k in range(0, n_items, at_once)]
-        results = []
-        n_threads = min(self.n_threads, len(parts))
-        with ThreadPoolExecutor(n_threads) if n_threads > 1 else nullcontext() as pool:
+        results: dict[int, Result] = {}
+        failures: list[BaseException] = []
+        next_part = count()
+
+        def work(tell: Callable[[float], None] | None = None) -> None:
             try:
-                for result in map(task, parts) if pool is None else pool.map(task, parts):
-                    results.append(result)
-                    self._tell(self._n_done + len(results) / len(parts))
-            finally:  # where something was raised, above all by `progress`
-                if pool is not None:
-                    pool.shutdown(cancel_futures=True)
+                while not failures and (i := next(next_part)) < len(parts):
+                    results[i] = task(parts[i])
+                    if tell is not None:
+                        tell(self._n_done + len(results) / len(parts))
+            except BaseException as failure:  # what was raised by `progress` above all
+                failures.append(failure)
+
+        helpers = [Thread(target=work) for _ in range(min(self.n_threads, len(parts)) - 1)]
+        for helper in helpers:
+            helper.start()
+        work(self._tell)
+        for helper in helpers:
+            helper.join()
+        if failures:
+            raise failures[0]
+        if parts:
+            self._tell(self._n_done + 1)
         self._n_done += 1
-        return results
+        return [results[i] for i in range(len(parts))]
 
     def do_both(
         self, one: Callable[[], Result], other: Callable[[], Other]

@@ -50,18 +50,20 @@ class Result(NamedTuple):
     merged into it; empty without quadrics."""
 
 
-def _arrange(mesh: Mesh, options: Options, crew: Crew) -> tuple[Arrangement, blocks.Cells | None]:
-    """The order to work in, and the cells of blocks where the surface may be divided."""
+def _arrange(
+    mesh: Mesh, options: Options, crew: Crew
+) -> tuple[Arrangement, blocks.Cells | None, blocks.Division | None]:
+    """The order to work in, the cells where the surface may be divided, and how if it is known."""
     can_divide = options.blocked != "violate" and options.intersections == "allow"
     in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
     least = LEAST_BLOCKS * (blocks.RUN if in_runs else blocks.FACES)
     if not can_divide or len(mesh.faces) < least:
-        return as_given(mesh), None
-    cells = blocks.runs(mesh, crew) if in_runs else None
-    if cells is not None:
-        return as_given(mesh), cells
+        return as_given(mesh), None, None
+    runs = blocks.runs(mesh, crew) if in_runs else None
+    if runs is not None:
+        return as_given(mesh), *runs
     arranged = by_locality(mesh, crew)
-    return arranged, blocks.two_ways(arranged.mesh, crew)
+    return arranged, blocks.two_ways(arranged.mesh, crew), None
 
 
 class _Done(NamedTuple):
@@ -113,7 +115,7 @@ class Engine:
         n, m = len(mesh.vertices), len(mesh.faces)
         self._crew = Crew(threads)
         self.n_threads = self._crew.n_threads
-        self._arranged, self._cells = _arrange(mesh, options, self._crew)
+        self._arranged, self._cells, self._division = _arrange(mesh, options, self._crew)
         self._surface, self.topology_before, first_corner = start_surface(
             *(mesh, self._arranged, options, locked, self.n_threads)
         )
@@ -126,7 +128,9 @@ class Engine:
         self._cost = None if options.has_one_threshold else new_costs(m)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
-        self._listed = np.arange(m, dtype=np.int32)
+        self._listed = (
+            np.arange(m, dtype=np.int32) if self._division is None else self._division.listed
+        )
         self.options, self.rules = options, options.rules()
         if bound is not None:
             self.rules = self.rules._replace(is_bounded=True)
@@ -347,9 +351,15 @@ class Engine:
         """Divide the live faces, in the one way and in the other in turn."""
         assert self._cells is not None
         surface, way = self._surface, self.n_sweeps % 2
-        all_blocks = blocks.divide(
-            self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed, self._crew
-        )
+        known, self._division = self._division, None
+        if known is not None and self.n_sweeps == 0:
+            all_blocks = known.blocks
+            self._surface = surface = surface._replace(vertex_block=known.vertex_block)
+        else:
+            all_blocks = blocks.divide(
+                *(self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed),
+                self._crew,
+            )
         if self.topology_before.n_boundary_loops:
             kernels.loops.find_loop_homes(
                 surface.loop, surface.merged_into, surface.vertex_block, surface.loop_home
