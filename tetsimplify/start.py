@@ -181,12 +181,13 @@ def new_costs(n_faces: int) -> NDArray[np.float32]:
 def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     """Scratch space for so many faces, real and virtual vertices, and as many or no nodes."""
     state = kernels.state
+    room = 3 * state.AT_ONCE + state.LANES + kernels.cost.AHEAD  # for the edges PENDING
     scratch: Scratch = state.Scratch(
         tally=np.zeros(state.TALLY_SIZE, np.int64),
         mark=np.zeros(n_coned, np.int32),
         face_mark=np.zeros(n_faces, np.int32),
         nodes=np.zeros((3, n_nodes), np.int32),
-        lists=np.empty((state.N_LISTS, max(n_faces + 2, 3 * state.AT_ONCE)), np.int32),
+        lists=np.empty((state.N_LISTS, max(n_faces + 2, room)), np.int32),
         ring=np.empty((2, 2 * n_faces + 4), np.int32),
         point=np.zeros(state.POINT_SIZE),
         lanes=np.zeros(state.N_ROWS * state.WIDTH),

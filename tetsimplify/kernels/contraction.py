@@ -12,6 +12,7 @@ from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition, list_ring
 from tetsimplify.kernels.placement import find_place
+from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.quadrics import (
     MAX_ERROR2,
     increase,
@@ -68,7 +69,10 @@ def contract_simple(surface, quadrics, watch, scratch, rules, cost, corner, colo
         return OUTSIDE
     if surface.locked[v] + surface.locked[u] > 1:
         return LOCKED
-    n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, rules, corner)
+    if quadrics is not None:
+        prefetch_row(quadrics.matrix, v)
+        prefetch_row(quadrics.matrix, u)
+    n_v, n_u, n_doomed, n_common = gather_stars(surface, quadrics, scratch, rules, corner)
     if rules.blocked != VIOLATE:
         allowed = link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common)
         if allowed != CONTRACTIBLE:

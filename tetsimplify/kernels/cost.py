@@ -5,6 +5,7 @@ import numpy as np
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
+from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.quadrics import (
     CONSTANT,
     increase,
@@ -31,6 +32,7 @@ from tetsimplify.kernels.state import (
 # A row of costs: of the edges that begin at the corners of a face, and the least of these. That is
 # -inf where the costs are not up to date, and inf of a face that is settled.
 COLUMNS, LEAST = 4, 3
+AHEAD = 24  # so many edges before they are looked at, what they need is fetched
 # By the state of a face: which of its edges is not to be ranked anew, opposite of what has moved.
 UNCHANGED = (-1,) * MOVED_EVEN + (1, 2, 0, 1, 2, 0)
 
@@ -185,6 +187,10 @@ def _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, la
     """Find the costs of at most LANES edges PENDING, at the places of least error."""
     vertices = surface.vertices
     for j in range(n_edges):
+        for end in (PENDING + 1, PENDING + 2):
+            later = np.uint32(lists[end, first + j + AHEAD])
+            prefetch_row(quadrics.matrix, later)
+            prefetch_row(vertices, later)
         a, b = np.uint32(lists[PENDING + 1, first + j]), np.uint32(lists[PENDING + 2, first + j])
         (
             lanes[j], lanes[LANES + j], lanes[2 * LANES + j], lanes[3 * LANES + j],
