@@ -74,6 +74,13 @@ class _Done(NamedTuple):
     deferred: NDArray[np.int32]
 
 
+class _Desk(NamedTuple):
+    """What a task works with, and the next one after it."""
+
+    scratch: Scratch
+    merges: NDArray[np.float64]
+
+
 class Engine:
     """Contracts edges of an oriented manifold.
 
@@ -142,7 +149,7 @@ class Engine:
         n_coned = n + self.topology_before.n_boundary_loops
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
-        self._idle: SimpleQueue[Scratch] = SimpleQueue()  # what tasks have left for the next ones
+        self._desks: SimpleQueue[_Desk] = SimpleQueue()  # those that no task works at
 
     @property
     def n_faces(self) -> int:
@@ -392,23 +399,18 @@ class Engine:
         ends = all_blocks[at_once - 1 :: at_once, 1].tolist()
         ends = [*ends, int(all_blocks[-1, 1])]
         room = max(end - begin for begin, end in pairwise([0, *ends]))
-        idle = self._idle
-
-        def borrow() -> Scratch:
-            try:
-                own = idle.get_nowait()
-            except Empty:
-                return start_scratch(room, len(scratch.mark), 0)
-            return own if len(own.face_mark) >= room else start_scratch(room, len(own.mark), 0)
 
         def do(part: slice) -> _Done:
-            own, some = borrow(), all_blocks[part]
-            own.tally[: state.N_DONE] = own.tally[state.N_DEFERRED] = 0
-            merges = np.empty((int((some[:, 1] - some[:, 0]).sum()), 2))
-            n_contracted = task(surface._replace(merges=merges), own, some)
-            deferred = own.lists[state.DEFERRED, : own.tally[state.N_DEFERRED]].copy()
-            done = _Done(own.tally[: state.N_DONE].copy(), merges[:n_contracted].copy(), deferred)
-            idle.put(own)
+            own, some = self._borrow_desk(room), all_blocks[part]
+            tally, deferred = own.scratch.tally, own.scratch.lists[state.DEFERRED]
+            tally[: state.N_DONE] = tally[state.N_DEFERRED] = 0
+            n_contracted = task(surface._replace(merges=own.merges), own.scratch, some)
+            done = _Done(
+                tally[: state.N_DONE].copy(),
+                own.merges[:n_contracted].copy(),
+                deferred[: tally[state.N_DEFERRED]].copy(),
+            )
+            self._desks.put(own)
             return done
 
         def tell(name: str, done: float) -> None:
@@ -428,6 +430,17 @@ class Engine:
             scratch.tally[state.N_DEFERRED] += len(deferred)
         self._unite()
         return n_contracted
+
+    def _borrow_desk(self, n_faces: int) -> _Desk:
+        """A desk with room for so many faces: one that is free, or a new one."""
+        try:
+            desk = self._desks.get_nowait()
+            if len(desk.merges) >= n_faces:
+                return desk
+        except Empty:
+            pass
+        scratch = start_scratch(n_faces, len(self._scratch.mark), 0)
+        return _Desk(scratch, np.empty((n_faces, 2)))
 
     def mesh(self) -> Mesh:
         """The live faces, with all vertices under their old numbers."""
@@ -598,7 +611,6 @@ class Engine:
                 self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
         self._surface, self._cost, self._face_origin = live, cost, origin
         self._listed = np.arange(n_live, dtype=np.int32)
-        self._scratch.face_mark.fill(0)
 
     def _count_live(self, part: slice) -> int:
         corner_vertex = self._surface.corner_vertex

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import mmap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 CACHE_LINE = 64  # bytes
+LARGE = 2**20  # bytes: arrays for which it pays to ask for small pages
 SAMPLE = 2**12  # faces whose areas tell the unit of the weights
 AT_ONCE = 2**16  # vertices in a task for a thread
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
@@ -185,12 +187,24 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     scratch: Scratch = state.Scratch(
         tally=np.zeros(state.TALLY_SIZE, np.int64),
         mark=np.zeros(n_coned, np.int32),
-        face_mark=np.zeros(n_faces, np.int32),
-        nodes=np.zeros((3, n_nodes), np.int32),
-        lists=np.empty((state.N_LISTS, max(n_faces + 2, room)), np.int32),
-        ring=np.empty((2, 2 * n_faces + 4), np.int32),
+        face_mark=_sparse_zeros(n_faces),
+        nodes=_sparse_zeros(3, n_nodes),
+        lists=_sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),
+        ring=_sparse_zeros(2, 2 * n_faces + 4),
         point=np.zeros(state.POINT_SIZE),
         lanes=np.zeros(state.N_ROWS * state.WIDTH),
     )
     scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
     return scratch
+
+
+def _sparse_zeros(*shape: int) -> NDArray[np.int32]:
+    """Zeros (int32) that take memory only where they are touched, and that in small pages.
+
+    NumPy asks for large pages for large arrays. Of those in which only a few places are touched,
+    far apart, these would take all the memory, and the time to clear it.
+    """
+    size = 4 * math.prod(shape)
+    if size < LARGE:
+        return np.zeros(shape, np.int32)
+    return np.frombuffer(mmap.mmap(-1, size), np.int32).reshape(shape)

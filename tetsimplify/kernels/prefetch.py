@@ -9,7 +9,7 @@ from numba.np import arrayobj
 
 @intrinsic
 def prefetch_row(typing_context, array, row):
-    """Start to fetch the beginning of a row of an array with two axes.
+    """Start to fetch the beginning of a row of an array, or an element of it.
 
     Nothing is read: the row may be anywhere.
     """
