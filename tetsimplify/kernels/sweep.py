@@ -21,6 +21,7 @@ from tetsimplify.kernels.cost import (
     without,
 )
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
+from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.state import (
     AT_ONCE,
     BLOCK,
@@ -51,6 +52,7 @@ from tetsimplify.kernels.state import (
 )
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces is the last of its block
+SOON = 6  # so many faces before one is looked at, its surroundings are fetched
 RAISE = 4.0  # so many times the threshold is what a refused edge waits for
 
 
@@ -78,6 +80,15 @@ def _defer(scratch, f):
     if n < scratch.lists.shape[1]:
         scratch.lists[DEFERRED, n] = f
         scratch.tally[N_DEFERRED] = n + 1
+
+
+@part
+def _will_be_walked_from(surface, f):
+    """Start to fetch where the stars of the vertices of a face go on."""
+    for corner in range(3 * np.int64(f), 3 * np.int64(f) + 3):
+        following = np.uint32(surface.next_corner[corner])
+        prefetch_row(surface.next_corner, following)
+        prefetch_row(surface.corner_vertex, following)
 
 
 @kernel_in_place
@@ -142,6 +153,7 @@ def _sweep_run(surface, quadrics, watch, scratch, rules, listed, first, last, co
     n_contracted = 0
     for i in range(n_waiting):
         f = waiting[i]
+        _will_be_walked_from(surface, waiting[min(i + SOON, n_waiting - 1)])
         state = surface.face_state[f]
         if state == SETTLED or state == colour:
             continue
