@@ -1,10 +1,11 @@
 """Hints to the processor, of what will be read soon."""
 
 import numba
-from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numba.np import arrayobj
+
+ir = cgutils.ir  # of llvmlite, as Numba itself uses it
 
 
 @intrinsic
@@ -20,8 +21,7 @@ def prefetch_row(typing_context, array, row):
         stride = cgutils.unpack_tuple(builder, parts.strides)[0]
         offset = builder.mul(context.cast(builder, arguments[1], row_type, types.intp), stride)
         address = builder.add(builder.ptrtoint(parts.data, offset.type), offset)
-        pointer = builder.inttoptr(address, ir.IntType(8).as_pointer())
-        number = ir.IntType(32)
+        pointer, number = builder.inttoptr(address, cgutils.voidptr_t), cgutils.int32_t
         kind = ir.FunctionType(ir.VoidType(), [pointer.type, number, number, number])
         prefetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
         reading, near, data = number(0), number(3), number(1)
