@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from itertools import pairwise
 from types import TracebackType
 from typing import TypeVar
@@ -57,10 +57,34 @@ class Workers:
         return list(self.each(task, items))
 
     def each(self, task: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """What comes of each item as soon as it and those before it are done."""
+        """What comes of each item as soon as it and those before it are done.
+
+        The thread of the caller does its share.
+        """
         if self.n_threads == 1 or len(items) == 1:
-            return map(task, items)
-        return self._started().map(task, items)
+            yield from map(task, items)
+            return
+        results: dict[int, Result] = {}
+        numbers = iter(range(len(items)))
+
+        def take_some() -> None:
+            for i in numbers:
+                results[i] = task(items[i])
+
+        helpers = [self._started().submit(take_some) for _ in range(self.n_threads - 1)]
+        try:
+            for k in range(len(items)):
+                while k not in results and (i := next(numbers, -1)) >= 0:
+                    results[i] = task(items[i])
+                if k not in results:
+                    for helper in helpers:
+                        if not helper.cancel():  # which is busy elsewhere
+                            helper.result()
+                yield results[k]
+        finally:
+            for _ in numbers:  # nothing is left to be taken
+                pass
+            wait([helper for helper in helpers if not helper.cancel()])
 
     def submit(self, task: Callable[[], Result]) -> Future[Result]:
         """Begin with a task, after those that were submitted before; with one thread, do it."""
