@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,10 +14,13 @@ import naive
 import naive_quadrics
 import strategies
 import tetsimplify
+from corner_tables import assert_engine_in_order
 from test_simplify import assert_maps_fit, assert_remaining_listed, assert_same_topology
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
+from tetsimplify.kernels.corners import DEAD
+from tetsimplify.kernels.cost import COLUMNS, LEAST, _ranked_cost, is_ranked
 from tetsimplify.kernels.quadrics import CONSTANT, LINEAR
 from tetsimplify.options import BLOCKED, BOUNDARIES, PLACEMENTS, Options
 from tetsimplify.schedule import next_thresholds, run
@@ -153,6 +157,42 @@ def test_the_optimum_is_the_middle_where_the_planes_do_not_decide():
     assert z == pytest.approx(0.25, rel=1e-3)
 
 
+@numba.njit
+def costs_one_by_one(surface, quadrics, rules):
+    """The costs of all edges by the slow way, each alone, in rows as the engine keeps them."""
+    costs = np.full((len(surface.face_state), 3), np.inf, np.float32)
+    for f in range(len(surface.face_state)):
+        for k in range(3):
+            a, b = surface.corner_vertex[3 * f + k], surface.corner_vertex[3 * f + (k + 1) % 3]
+            if is_ranked(surface.loop, a, b):
+                costs[f, k] = _ranked_cost(surface, quadrics, rules, a, b)[0]
+    return costs
+
+
+@pytest.mark.parametrize(
+    "criteria",
+    [{}, {"max_edge_length": 0.12}, {"max_quadric_error": 0.002}, {"cost": "length"}],
+    ids=["plain", "edges are too long", "errors are too large", "by length"],
+)
+def test_costs_side_by_side_are_those_of_edges_alone(criteria):
+    """Of edges that have been merged, on a surface with locked and with boundary vertices."""
+    for seed in range(30):
+        vertices, faces = strategies.adversarial_mesh(seed)
+        options = Options(target_faces=0, **{"placement": "quadric", **criteria})
+        locked = np.random.default_rng(seed).random(len(vertices)) < 0.1
+        engine = Engine(as_mesh(vertices, faces), options, locked)
+        for _ in range(3):
+            engine.rank()
+            engine.forget_refusals()
+            engine.rank()
+            rows = engine._cost.reshape(-1, COLUMNS)
+            live = engine._surface.corner_vertex[::3] != DEAD
+            expected = costs_one_by_one(engine._surface, engine._quadrics, engine.rules)
+            assert np.array_equal(rows[live, :3], expected[live])
+            assert np.array_equal(rows[live, LEAST], expected[live].min(axis=1))
+            engine.sweep_ranked(next_thresholds(engine, 0.0).thresholds)
+
+
 def test_errors_of_the_result_are_those_of_the_planes_merged():
     """Accumulated through thousands of contractions, and the same as from the list of planes."""
     for offset in (0.0, 1e6):
@@ -243,6 +283,8 @@ def test_invariants_after_every_sweep(cost, blocked):
                 after = naive.summary(live.faces)
                 assert after.is_sound
                 assert naive.has_same_topology(before, after)
+                assert_engine_in_order(engine)
+            engine.compact_when_half()
             n_barren = 0 if n_contracted else n_barren + 1
             if threshold == np.inf and n_contracted == 0:
                 break

@@ -12,6 +12,7 @@ import meshes
 import naive
 import strategies
 import tetsimplify
+from corner_tables import assert_engine_in_order
 from tetsimplify import blocks, kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.engine import Engine
@@ -138,6 +139,8 @@ def test_invariants_after_every_sweep(blocked, placement, foldover, outer):
                 after = naive.summary(live.faces)
                 assert after.is_sound
                 assert naive.has_same_topology(before, after)
+                assert_engine_in_order(engine)
+            engine.compact_when_half()
             if n_contracted == 0:
                 break
         else:

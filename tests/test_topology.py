@@ -12,6 +12,7 @@ import meshes
 import naive
 import strategies
 import tetsimplify
+from corner_tables import assert_in_order
 from tetsimplify import kernels
 from tetsimplify.topology import examine
 
@@ -170,13 +171,9 @@ def as_bytes(examined):
 def assert_linked(corner_vertex, examined):
     """All corners of a vertex form one circle, in a manifold anticlockwise with a gap at most."""
     report, loop, next_corner, first_corner = examined
-    valence = np.bincount(corner_vertex, minlength=len(first_corner))
-    faces = corner_vertex.reshape(-1, 3)
-    ahead, behind = np.roll(faces, -1, axis=1).reshape(-1), np.roll(faces, 1, axis=1).reshape(-1)
-    n_gaps = np.zeros(len(first_corner), int)
-    np.add.at(n_gaps, corner_vertex, behind != ahead[next_corner])
     if report.is_manifold:
-        assert np.array_equal(n_gaps, loop >= 0)
+        assert_in_order(corner_vertex, next_corner, loop >= 0)
+    valence = np.bincount(corner_vertex, minlength=len(first_corner))
     for v in np.flatnonzero(valence):
         corner, seen = first_corner[v], set()
         while corner not in seen:

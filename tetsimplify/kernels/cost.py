@@ -7,7 +7,7 @@ from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.quadrics import (
-    CONSTANT,
+    errors_apart,
     increase,
     is_beyond_bound,
     reachable_optimum,
@@ -200,7 +200,7 @@ def _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, la
         lanes[10 * LANES + j] = vertices[b, 0] - vertices[a, 0]
         lanes[11 * LANES + j] = vertices[b, 1] - vertices[a, 1]
         lanes[12 * LANES + j] = vertices[b, 2] - vertices[a, 2]
-        lanes[13 * LANES + j] = quadrics.linear[a, CONSTANT] + quadrics.linear[b, CONSTANT]
+        lanes[13 * LANES + j] = errors_apart(quadrics, a, b)
     for j in range(LANES):
         q = (
             lanes[j], lanes[LANES + j], lanes[2 * LANES + j], lanes[3 * LANES + j],

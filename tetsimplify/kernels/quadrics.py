@@ -101,7 +101,13 @@ def weight(quadrics, v):
 @part
 def increase(quadrics, v, u, error):
     """How much more the error is than those of v and u alone."""
-    return max(error - quadrics.linear[v, CONSTANT] - quadrics.linear[u, CONSTANT], 0.0)
+    return max(error - errors_apart(quadrics, v, u), 0.0)
+
+
+@part
+def errors_apart(quadrics, v, u):
+    """The errors of v and u alone, together."""
+    return np.float64(quadrics.linear[v, CONSTANT]) + quadrics.linear[u, CONSTANT]
 
 
 @part
