@@ -24,7 +24,7 @@ FACES = 2**13  # in a block, at least: what their contraction needs fits the cac
 RUN = 2**16  # faces in a block of faces as they are given, at least: few of them are at its ends,
 LONGEST_RUN, N_RUNS = 2**17, 16  # and fewer of longer ones, where there are enough to share
 CELL = 2**10  # faces: blocks are made of cells of about so many
-AT_ONCE = 16  # blocks of FACES in a task for a thread
+AT_ONCE = 16  # blocks of FACES in a task for a thread, at most
 PART = 2**17  # faces in a part, where what is done with them does not depend on the parts
 MOST_SHARED = 0.2  # of the vertices of runs may be between them
 UNLIMITED = 2**62  # faces that may go
@@ -47,7 +47,7 @@ class Cells(NamedTuple):
     first: tuple[int, int]
     """The same for the first block of each way."""
     at_once: int
-    """Blocks in a task for a thread."""
+    """Blocks in a task for a thread, at most."""
 
 
 class Division(NamedTuple):

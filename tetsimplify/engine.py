@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 FACES_AT_ONCE = 2**20  # between two calls of `progress`, where there are no blocks
 LEAST_BLOCKS = 4  # a surface of fewer is not divided
+LEAST_TASKS = 8  # for threads, if there are as many blocks
 LEAST_SPARE = 64  # faces a block on the average: with fewer to go the surface is not divided
 MOST_SWEEPS = 8  # over a block below one length, before its edges to others have their turn
 NOTHING = 1e-8  # of the diagonal: a quadric error or a length that is as good as none
@@ -395,7 +396,7 @@ class Engine:
         """
         state, surface, scratch = kernels.state, self._surface, self._scratch
         assert self._cells is not None
-        at_once = self._cells.at_once
+        at_once = max(1, min(self._cells.at_once, len(all_blocks) // LEAST_TASKS))
         ends = all_blocks[at_once - 1 :: at_once, 1].tolist()
         ends = [*ends, int(all_blocks[-1, 1])]
         room = max(end - begin for begin, end in pairwise([0, *ends]))
