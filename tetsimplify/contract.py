@@ -56,6 +56,8 @@ def contract(
     with clock.stage("contract"):
         n_rounds = 1
         if options.max_error is None:
+            if not vertex_data:
+                engine.do_without_log()
             run(engine, progress)
         else:
             engine, n_rounds = run_within(mesh, options, locked, engine.n_threads, progress)

@@ -70,6 +70,7 @@ def _arrange(
 class _Done(NamedTuple):
     """What a task has done."""
 
+    n_contracted: int
     tally: NDArray[np.int64]
     merges: NDArray[np.float64]
     deferred: NDArray[np.int32]
@@ -407,6 +408,7 @@ class Engine:
             tally[: state.N_DONE] = tally[state.N_DEFERRED] = 0
             n_contracted = task(surface._replace(merges=own.merges), own.scratch, some)
             done = _Done(
+                n_contracted,
                 tally[: state.N_DONE].copy(),
                 own.merges[:n_contracted].copy(),
                 deferred[: tally[state.N_DEFERRED]].copy(),
@@ -422,7 +424,7 @@ class Engine:
         n_contracted = 0
         for done in crew.share(do, len(all_blocks), at_once):
             n_before = self.tally("N_SIMPLE") + self.tally("N_NESTED")
-            n_contracted += len(done.merges)
+            n_contracted += done.n_contracted
             surface.merges[n_before : n_before + len(done.merges)] = done.merges
             scratch.tally[: state.N_DONE] += done.tally
             room_left = scratch.lists[state.DEFERRED, self.tally("N_DEFERRED") :]
@@ -436,12 +438,12 @@ class Engine:
         """A desk with room for so many faces: one that is free, or a new one."""
         try:
             desk = self._desks.get_nowait()
-            if len(desk.merges) >= n_faces:
+            if len(desk.scratch.face_mark) >= n_faces:
                 return desk
         except Empty:
             pass
         scratch = start_scratch(n_faces, len(self._scratch.mark), 0)
-        return _Desk(scratch, np.empty((n_faces, 2)))
+        return _Desk(scratch, np.empty((n_faces if len(self._surface.merges) else 0, 2)))
 
     def mesh(self) -> Mesh:
         """The live faces, with all vertices under their old numbers."""
@@ -450,6 +452,10 @@ class Engine:
         arranged = self._arranged
         faces = arranged.vertex_origin[corner_vertex[live]]
         return Mesh(self._surface.vertices[arranged.vertex_place], faces)
+
+    def do_without_log(self) -> None:
+        """Keep no log of the merges, before the run: nobody will ask for `vertex_weights`."""
+        self._surface = self._surface._replace(merges=np.empty((0, 2)))
 
     def vertex_weights(self) -> VertexWeights:
         """How the merged vertices are made of those given."""

@@ -189,8 +189,9 @@ def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
         surface.vertices[v, axis] = scratch.point[axis]
     surface.merged_into[u] = v
     n_merges = scratch.tally[N_SIMPLE] + scratch.tally[N_NESTED]
-    surface.merges[n_merges, 0] = u
-    surface.merges[n_merges, 1] = scratch.point[PLACE]
+    if n_merges < len(surface.merges):  # of a log that is kept
+        surface.merges[n_merges, 0] = u
+        surface.merges[n_merges, 1] = scratch.point[PLACE]
     surface.locked[v] = max(surface.locked[v], surface.locked[u])
     surface.loop[v] = max(surface.loop[v], surface.loop[u])
 

@@ -47,7 +47,8 @@ class Surface(NamedTuple):
     loop_home: np.ndarray  # int32 (n_loops,): block that has all faces at it, or SHARED
     locked: np.ndarray  # uint8 (n,): 1 where the vertex may neither move nor vanish, 2 where its
     # edges may not be contracted either
-    merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE
+    merges: np.ndarray  # float64 (n, 2): vertices merged, in order, each with its PLACE; no rows
+    # where nobody asks for them
 
 
 class Rules(NamedTuple):
