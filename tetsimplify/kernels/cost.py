@@ -146,7 +146,8 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
             n_edges = min(LANES, n_pending - first)
             _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, scratch.lanes)
     for i in range(n_faces):
-        note_least(cost, waiting[i])
+        if surface.face_state[waiting[i]] == RANKED:
+            note_least(cost, waiting[i])
 
 
 @part
