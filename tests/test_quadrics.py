@@ -488,7 +488,10 @@ def test_no_face_deviates_from_the_normals_given(limit):
     )
     free = tetsimplify.simplify(vertices, faces, keep_ratio=0.05, normal_deviation=None, **options)
     assert result.report.n_nested == free.report.n_nested == 0
-    assert naive_quadrics.deviations(vertices, faces, result).max() <= limit + 1e-6
+    n_merged = np.bincount(result.vertex_map, minlength=len(result.vertices))
+    is_new = (n_merged[result.faces] > 1).any(axis=1)  # some of those given deviate themselves
+    assert np.count_nonzero(is_new) > 100
+    assert naive_quadrics.deviations(vertices, faces, result)[is_new].max() <= limit + 1e-6
     assert naive_quadrics.deviations(vertices, faces, free).max() > limit
 
 
