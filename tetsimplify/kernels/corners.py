@@ -60,7 +60,9 @@ def face_of(corner):
 
 @kernel
 def link_corners(corner_vertex, n_vertices):
-    """Link the live corners of each vertex into a circular list.
+    """Link the live corners of each vertex into a circular list, in no particular order.
+
+    `surface.survey_inside` and `surface.survey_rest` put them in order, too.
 
     Returns
     -------

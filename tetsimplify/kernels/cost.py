@@ -104,8 +104,7 @@ def costs_of(cost, f):
 @part
 def note_least(cost, f):
     """Bring the least of the costs of a face up to date."""
-    x, y, z = costs_of(cost, f)
-    cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)] = min(min(x, y), z)
+    cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)] = cheapest(costs_of(cost, f))[0]
 
 
 @part
@@ -122,7 +121,7 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
     colour : int
         That of the sweep, which tells what it has touched; -1 for none.
     """
-    waiting, lists = scratch.lists[WAITING], scratch.lists
+    lists, waiting = scratch.lists, scratch.lists[WAITING]
     n_pending = 0
     for i in range(n_faces):
         f = np.uint32(waiting[i])

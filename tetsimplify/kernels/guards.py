@@ -23,7 +23,7 @@ NO_GUARD = -2.0  # a cosine that every pair of normals exceeds
 FLAT = 1e-10
 # Where original normals cancel but for this part, they do not tell what is outside.
 UNDECIDED = 0.1
-LEAST = 1e-300  # a number above 0, by which can be divided
+TINY = 1e-300  # a number above 0, by which can be divided
 # A triangle whose shape is worse than this, where 1 is equilateral, is a needle.
 NEEDLE = 0.1
 # Rows of the lanes with what is found about a face; instead of a shape, what forbids it.
@@ -185,7 +185,7 @@ def _look_at_faces(quadrics, scratch, rules, v, u, first, n):
         deviates = (dot * abs(dot) < deviation * r2 * new2) & (not may_deviate)
         deviates &= r2 > cancelled * cancelled
         # the shape of a triangle is 4 sqrt(3) area / (sum of the squares of its edges)
-        new_shape = 12.0 * new2 / max(new_sum * new_sum, LEAST)
+        new_shape = 12.0 * new2 / max(new_sum * new_sum, TINY)
         new_shape = DEVIATES if deviates else new_shape
         lanes[NEW_SHAPE * WIDTH + j] = TURNS if turns else new_shape
-        lanes[OLD_SHAPE * WIDTH + j] = 12.0 * old2 / max(old_sum * old_sum, LEAST)
+        lanes[OLD_SHAPE * WIDTH + j] = 12.0 * old2 / max(old_sum * old_sum, TINY)
