@@ -239,8 +239,9 @@ def test_foldover_guard_bounds_the_turn_of_every_face():
     engine = Engine(as_mesh(vertices, faces), options, np.zeros(len(vertices), bool))
     turned = 0
     previous = normals_of(engine)
+    listed = np.arange(len(faces), dtype=np.int32)
     for first in range(len(faces)):
-        bundles = engine._surface, None, None, engine._scratch, engine.rules, engine._listed
+        bundles = engine._surface, None, None, engine._scratch, engine.rules, listed
         one_face = blocks.parts(len(faces), 1)[first : first + 1]
         if kernels.sweep.sweep(*bundles, one_face, 1, kernels.state.STALE_EVEN, True) == 0:
             continue  # one contraction at a time, because two may turn the same face

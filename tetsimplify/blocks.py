@@ -23,8 +23,8 @@ from tetsimplify.mesh import Mesh
 FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
 RUN = 2**16  # faces in a block of faces as they are given, at least: few of them are at its ends,
 LONGEST_RUN, N_RUNS = 2**17, 16  # and fewer of longer ones, where there are enough to share
-CELL = 2**10  # faces: blocks are made of cells of about so many
-AT_ONCE = 16  # blocks of FACES in a task for a thread, at most
+CELL_BITS = 10  # blocks are made of cells of about 2**10 faces
+AT_ONCE = 4  # blocks of FACES in a task for a thread, at most
 PART = 2**17  # faces in a part, where what is done with them does not depend on the parts
 MOST_SHARED = 0.2  # of the vertices of runs may be between them
 UNLIMITED = 2**62  # faces that may go
@@ -34,14 +34,16 @@ SHIFT = 1.0 / 3.0  # of the extent, by which the cells of the second way are shi
 
 Blocks = NDArray[np.int64]
 SPARE = 2  # the column
+IN_ORDER = np.empty(0, np.int32)  # instead of the cells of faces
 
 
 class Cells(NamedTuple):
     """The cells of the faces, in two ways."""
 
     of_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
-    """Shapes (m,)."""
-    counts: tuple[int, int]
+    """Shapes (m,); empty where cells are runs of 2**CELL_BITS faces in the order at hand."""
+    n_curve: int
+    """How many cells there are along a curve, where they are no runs."""
     least: int
     """Faces in a block, at least."""
     first: tuple[int, int]
@@ -65,25 +67,29 @@ def two_ways(mesh: Mesh, crew: Crew) -> Cells:
 
     In the first way they follow that order, in the second one they are those of a shifted curve.
     """
-    m = len(mesh.faces)
+    n, m = len(mesh.vertices), len(mesh.faces)
     low, high = kernels.order.bounds(mesh.vertices)
     extent = float((high - low).max())
-    bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / CELL))), MOST_BITS)
+    bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / 2**CELL_BITS))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
     curve = low - SHIFT * extent, scale, 2**bits - 1
-    shifted, number = np.empty(m, np.int32), np.zeros(2 ** (3 * bits), np.int32)
+    of_vertices, shifted = np.empty(n, np.int32), np.empty(m, np.int32)
+    number = np.zeros(2 ** (3 * bits), np.int32)
 
     def find(part: slice) -> None:
-        kernels.order.find_cells(*mesh, *curve, part.start, part.stop, shifted, number)
+        kernels.order.find_cells(mesh.vertices, *curve, part.start, part.stop, of_vertices)
+
+    def take(part: slice) -> None:
+        kernels.order.take_cells(mesh.faces, of_vertices, part.start, part.stop, shifted, number)
 
     def renumber(part: slice) -> None:
         kernels.order.renumber(number, part.start, part.stop, shifted)
 
-    crew.share(find, m, PART)
+    crew.share(find, n, PART)
+    crew.share(take, m, PART)
     n_shifted = int(kernels.order.number_cells(number))
     crew.share(renumber, m, PART)
-    counts = m // CELL + 1, n_shifted
-    return Cells((_by_order(m), shifted), counts, FACES, (FACES, FACES), AT_ONCE)
+    return Cells((IN_ORDER, shifted), n_shifted, FACES, (FACES, FACES), AT_ONCE)
 
 
 def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division] | None:
@@ -93,20 +99,14 @@ def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division] | None:
     much would be between the runs.
     """
     m = len(mesh.faces)
-    by_order, n_cells = _by_order(m), m // CELL + 1
     run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
-    cells = Cells((by_order, by_order), (n_cells, n_cells), run, (run, run // 2), 1)
+    cells = Cells((IN_ORDER, IN_ORDER), 0, run, (run, run // 2), 1)
     vertex_block, listed = np.zeros(len(mesh.vertices), np.int32), np.empty(m, np.int32)
     blocks = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, listed, crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
     if n_shared > MOST_SHARED * len(vertex_block):
         return None
     return cells, Division(blocks, vertex_block, listed)
-
-
-def _by_order(n_faces: int) -> NDArray[np.int32]:
-    """Cells of faces that follow one another."""
-    return np.repeat(np.arange(n_faces // CELL + 1, dtype=np.int32), CELL)[:n_faces]
 
 
 def copy_live(
@@ -119,17 +119,17 @@ def copy_live(
     begin : ndarray, shape (n_parts + 1,), int64
         Where the live faces of each part of PART faces begin.
     """
-    ways = cells.of_faces[:1] if cells.of_faces[0] is cells.of_faces[1] else cells.of_faces
-    live = np.empty((len(ways), begin[-1]), np.int32)
+    in_order, shifted = cells.of_faces
+    if not len(shifted):
+        return cells
+    live = np.empty(begin[-1], np.int32)
 
     def copy(part: slice) -> None:
         at = begin[part.start // PART]
-        for way, of_faces in enumerate(ways):
-            kernels.blocks.copy_cells(corner_vertex, of_faces, part.start, part.stop, at, live[way])
+        kernels.blocks.copy_cells(corner_vertex, shifted, part.start, part.stop, at, live)
 
     crew.share(copy, len(corner_vertex) // 3, PART)
-    first, last = live[0], live[-1]
-    return cells._replace(of_faces=(first, first if len(ways) == 1 else last))
+    return cells._replace(of_faces=(in_order, live))
 
 
 def divide(
@@ -153,8 +153,8 @@ def divide(
         Filled: the live faces block by block.
     crew : Crew
     """
-    of_faces, n_cells = cells.of_faces[way], cells.counts[way]
-    m = len(of_faces)
+    of_faces, m = (cells.of_faces[way], CELL_BITS), len(corner_vertex) // 3
+    n_cells = cells.n_curve if len(of_faces[0]) else (m >> CELL_BITS) + 1
     n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
     block_of, begin = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
     place = np.empty_like(n_faces)

@@ -18,7 +18,7 @@ from tetsimplify.edges import edge_extremes
 from tetsimplify.locality import Arrangement, as_given, by_locality
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
-from tetsimplify.start import new_costs, start_quadrics, start_scratch, start_surface
+from tetsimplify.start import start_quadrics, start_scratch, start_surface
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.intersections import Watch
@@ -59,10 +59,10 @@ def _arrange(
     in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
     least = LEAST_BLOCKS * (blocks.RUN if in_runs else blocks.FACES)
     if not can_divide or len(mesh.faces) < least:
-        return as_given(mesh), None, None
+        return as_given(mesh, crew), None, None
     runs = blocks.runs(mesh, crew) if in_runs else None
     if runs is not None:
-        return as_given(mesh), *runs
+        return as_given(mesh, crew), *runs
     arranged = by_locality(mesh, crew)
     return arranged, blocks.two_ways(arranged.mesh, crew), None
 
@@ -125,21 +125,20 @@ class Engine:
         self._crew = Crew(threads)
         self.n_threads = self._crew.n_threads
         self._arranged, self._cells, self._division = _arrange(mesh, options, self._crew)
-        self._surface, self.topology_before, first_corner = start_surface(
-            *(mesh, self._arranged, options, locked, self.n_threads)
-        )
+        start = start_surface(mesh, self._arranged, options, locked, self.n_threads)
+        self._surface, self.topology_before, _, self._on_loops = start
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics = start_quadrics(
-                self._surface, first_corner, options, arranged_bound, self._crew
-            )
-        self._cost = None if options.has_one_threshold else new_costs(m)
+            self._quadrics = start_quadrics(start, options, arranged_bound, self._crew)
+            places = self._quadrics.origin.view(np.float64)
+            self._surface = self._surface._replace(vertices=places)
+        self._cost = None
+        if not options.has_one_threshold:  # none up to date: 0 is below every threshold
+            self._cost = np.zeros(kernels.cost.COLUMNS * m, np.float32)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
-        self._listed = (
-            np.arange(m, dtype=np.int32) if self._division is None else self._division.listed
-        )
+        self._listed = np.empty(m, np.int32) if self._division is None else self._division.listed
         self.options, self.rules = options, options.rules()
         if bound is not None:
             self.rules = self.rules._replace(is_bounded=True)
@@ -209,12 +208,14 @@ class Engine:
             Try faces again all of whose short edges were refused before.
         progress : callable, optional
         """
-        n_faces = len(self._face_origin)
+        listed = self._all_faces()
+        n_faces = len(listed)
         parts = blocks.parts(n_faces, FACES_AT_ONCE)
         self._let_all_be_looked_at()
         n_contracted = 0
         for i in range(len(parts)):
-            n_contracted += self._sweep(self._surface, self._scratch, parts[i : i + 1], 1, retry)
+            part = parts[i : i + 1]
+            n_contracted += self._sweep(self._surface, self._scratch, listed, part, 1, retry)
             if progress is not None:  # every sweep is half of what is still to do
                 share = 1.0 - 0.5 * parts[i, 1] / max(1, n_faces)
                 progress("contract", 1.0 - 0.5**self.n_sweeps * share)
@@ -227,7 +228,7 @@ class Engine:
         self._let_all_be_looked_at()
 
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
-            return self._sweep(surface, scratch, some, MOST_SWEEPS, False)
+            return self._sweep(surface, scratch, self._listed, some, MOST_SWEEPS, False)
 
         begin = 1.0 - 0.5**self.n_sweeps
         n_contracted = self._share(task, all_blocks, progress, (begin, 0.5 * (1.0 + begin)))
@@ -235,11 +236,17 @@ class Engine:
         return n_contracted + self._unblock_deferred()
 
     def _sweep(
-        self, surface: Surface, scratch: Scratch, some: blocks.Blocks, n_sweeps: int, retry: bool
+        self,
+        surface: Surface,
+        scratch: Scratch,
+        listed: NDArray[np.int32],
+        some: blocks.Blocks,
+        n_sweeps: int,
+        retry: bool,
     ) -> int:
         bundles = surface, self._quadrics, self._watch, scratch, self.rules
         colour = kernels.state.STALE_EVEN
-        return int(kernels.sweep.sweep(*bundles, self._listed, some, n_sweeps, colour, retry))
+        return int(kernels.sweep.sweep(*bundles, listed, some, n_sweeps, colour, retry))
 
     def _let_all_be_looked_at(self) -> None:
         """Give all faces that wait for a sweep the colour that the next one does not have."""
@@ -285,11 +292,11 @@ class Engine:
         int
             Number of contractions.
         """
-        n_faces = len(self._face_origin)
+        listed = self._listed if divided else self._all_faces()
 
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
             bundles = surface, self._quadrics, self._watch, scratch, self.rules
-            lists = self._cost, thresholds, lenience, self._listed
+            lists = self._cost, thresholds, lenience, listed
             return int(kernels.sweep.sweep_ranked(*bundles, *lists, some, self._colour))
 
         if divided:
@@ -297,7 +304,8 @@ class Engine:
             blocks.allot(all_blocks, self._n_spare, self._count_cheaper(all_blocks, thresholds[-1]))
             n_contracted = self._share(task, all_blocks, progress, (done, done))
         else:
-            n_contracted = task(self._surface, self._scratch, blocks.whole(n_faces, self._n_spare))
+            whole = blocks.whole(len(listed), self._n_spare)
+            n_contracted = task(self._surface, self._scratch, whole)
             if progress is not None:
                 progress("contract", done)
         self._scratch.point[kernels.state.MAX_COST] = thresholds[-1]
@@ -369,20 +377,30 @@ class Engine:
                 *(self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed),
                 self._crew,
             )
-        if self.topology_before.n_boundary_loops:
-            kernels.loops.find_loop_homes(
-                surface.loop, surface.merged_into, surface.vertex_block, surface.loop_home
-            )
+        on_loops = self._vertices_on_loops()
+        kernels.loops.find_loop_homes(
+            on_loops, surface.loop, surface.vertex_block, surface.loop_home
+        )
         return all_blocks
 
     def _unite(self) -> None:
         """Make one block of all faces again."""
         surface = self._surface
         surface.vertex_block[:] = 0
-        self._listed = np.arange(len(self._face_origin), dtype=np.int32)
-        if self.topology_before.n_boundary_loops:
-            surface.loop_home[:] = 0
-            kernels.loops.count_loop_edges(surface.loop, surface.merged_into, surface.loop_size)
+        surface.loop_home[:] = 0
+        on_loops = self._vertices_on_loops()
+        kernels.loops.count_loop_edges(on_loops, surface.loop, surface.loop_size)
+
+    def _vertices_on_loops(self) -> NDArray[np.intp]:
+        """The boundary vertices that are left."""
+        kernels.loops.follow_merges(self._surface.merged_into, self._on_loops)
+        self._on_loops = np.unique(self._on_loops)
+        self._on_loops = self._on_loops[self._on_loops >= 0]
+        return self._on_loops
+
+    def _all_faces(self) -> NDArray[np.int32]:
+        """A list of all faces, for a sweep over the whole surface."""
+        return np.arange(len(self._face_origin), dtype=np.int32)
 
     def _share(
         self,
@@ -451,7 +469,7 @@ class Engine:
         live = corner_vertex[:, 0] != kernels.corners.DEAD
         arranged = self._arranged
         faces = arranged.vertex_origin[corner_vertex[live]]
-        return Mesh(self._surface.vertices[arranged.vertex_place], faces)
+        return Mesh(self._surface.vertices[arranged.vertex_place, :3], faces)
 
     def do_without_log(self) -> None:
         """Keep no log of the merges, before the run: nobody will ask for `vertex_weights`."""
@@ -471,50 +489,103 @@ class Engine:
         """The live part, renumbered in the order given, and what is left in it. Ends the run."""
         edges, reasons = self._remaining_edges()
         self._compact(is_last=True)
-        surface, place = self._surface, self._arranged.vertex_place
-        order = self._order_given()
-        faces = surface.corner_vertex.reshape(-1, 3)[order]
+        surface = self._surface
         number, n_used = self._new_numbers()
+        faces, face_map = self._faces_given()
         vertices = np.empty((n_used, 3))
-        kernels.result.copy_vertices(
-            surface.vertices, number, surface.merged_into, faces.reshape(-1), vertices
-        )
+
+        def copy(part: slice) -> None:
+            kernels.result.copy_vertices(surface.vertices, number, part.start, part.stop, vertices)
+
+        def renumber(part: slice) -> None:
+            kernels.result.renumber_corners(number, faces[part].reshape(-1))
+
+        self._crew.share(copy, len(number), blocks.PART)
+        self._crew.share(renumber, len(faces), blocks.PART)
+        vertex_map = self._follow_merges(number)
         shortest, longest = edge_extremes(Mesh(vertices, faces), self._crew)
         stop = self._stop(reasons, longest)
         return Result(
-            *(vertices, faces, number[place], self._face_origin[order], number[edges], reasons),
+            *(vertices, faces, vertex_map, face_map, number[edges], reasons),
             *(shortest, stop, self._vertex_errors(number, n_used)),
         )
 
     def _new_numbers(self) -> tuple[NDArray[np.int32], int]:
-        """The new number of what each vertex was merged into, -1 where that is gone; how many."""
-        surface, place = self._surface, self._arranged.vertex_place
-        n = len(place)
-        number, root = np.full(n, -1, np.int32), np.empty(n, np.int32)
-        n_used = kernels.result.number_vertices(surface.corner_vertex, place, number)
+        """The new number of each vertex, -1 where it is gone, and how many are left.
+
+        Their order is the one given.
+        """
+        surface, crew, visit = self._surface, self._crew, self._arranged.vertex_place
+        n = len(visit)
+        is_used, number = np.zeros(n, np.uint8), np.empty(n, np.int32)
+
+        def mark(part: slice) -> None:
+            corners = surface.corner_vertex[3 * part.start : 3 * part.stop]
+            kernels.result.mark_vertices(corners, is_used)
+
+        def count(part: slice) -> int:
+            return int(np.count_nonzero(is_used[visit[part]]))
+
+        def number_those(part: slice) -> None:
+            first = begin[part.start // blocks.PART]
+            kernels.result.number_vertices(visit[part], is_used, first, number)
+
+        crew.share(mark, len(self._face_origin), blocks.PART)
+        begin = np.cumsum([0, *crew.share(count, n, blocks.PART)])
+        crew.share(number_those, n, blocks.PART)
+        return number, int(begin[-1])
+
+    def _follow_merges(self, number: NDArray[np.int32]) -> NDArray[np.int32]:
+        """The number of what each vertex given was merged into, -1 where that is gone."""
+        visit, merged_into = self._arranged.vertex_place, self._surface.merged_into
+        vertex_map = np.empty(len(visit), np.int32)
 
         def follow(part: slice) -> None:
-            kernels.result.follow_merges(surface.merged_into, number, part.start, part.stop, root)
+            kernels.result.follow_merges(merged_into, number, visit[part], vertex_map[part])
 
-        self._crew.share(follow, n, blocks.PART)
-        return root, int(n_used)
+        self._crew.share(follow, len(visit), blocks.PART)
+        return vertex_map
 
-    def _order_given(self) -> NDArray[np.int32]:
-        """The live faces in the order in which they were given."""
-        origin = self._face_origin
+    def _faces_given(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """The live faces in the order in which they were given, and their numbers there."""
+        surface, origin, crew = self._surface, self._face_origin, self._crew
         if self._arranged.is_as_given:
-            return np.arange(len(origin), dtype=np.int32)
-        place = np.full(len(self._arranged.face_origin), -1, np.int32)
-        place[origin] = np.arange(len(origin), dtype=np.int32)
-        return place[place >= 0]
+            return surface.corner_vertex.reshape(-1, 3), origin
+        n, m = len(origin), len(self._arranged.face_origin)
+        place = np.empty(m, np.int32)
+        faces, face_map = np.empty((n, 3), np.int32), np.empty(n, np.int32)
+
+        def clear(part: slice) -> None:
+            place[part] = -1
+
+        def note(part: slice) -> None:
+            kernels.result.note_places(origin, part.start, part.stop, place)
+
+        def count(part: slice) -> int:
+            return int(np.count_nonzero(place[part] >= 0))
+
+        def copy(part: slice) -> None:
+            first = begin[part.start // blocks.PART]
+            kernels.result.copy_in_order(
+                surface.corner_vertex, place[part], part.start, first, faces, face_map
+            )
+
+        crew.share(clear, m, blocks.PART)
+        crew.share(note, n, blocks.PART)
+        begin = np.cumsum([0, *crew.share(count, m, blocks.PART)])
+        crew.share(copy, m, blocks.PART)
+        return faces, face_map
 
     def _vertex_errors(self, number: NDArray[np.int32], n_used: int) -> NDArray[np.float64]:
         """The quadric errors of the vertices that are left, as distances."""
         if self._quadrics is None:
             return np.empty(0)
         errors = np.empty(n_used)
-        merged_into = self._surface.merged_into
-        kernels.quadrics.vertex_errors(self._quadrics, merged_into, number, errors)
+
+        def find(part: slice) -> None:
+            kernels.quadrics.vertex_errors(self._quadrics, number, part.start, part.stop, errors)
+
+        self._crew.share(find, len(number), blocks.PART)
         return errors
 
     def _stop(self, reasons: NDArray[np.str_], longest_edge: float) -> str:
@@ -543,7 +614,7 @@ class Engine:
         begins = (3 * faces[:, None] + np.arange(3)).reshape(-1)
         ends = (3 * faces[:, None] + (1, 2, 0)).reshape(-1)
         edges = np.column_stack([surface.corner_vertex[begins], surface.corner_vertex[ends]])
-        a, b = surface.vertices[edges.T]
+        a, b = surface.vertices[edges.T, :3]
         is_told = ((a - b) ** 2).sum(axis=1) < self.rules.max_length2
         if self._cost is not None:  # only one corner of an edge knows
             low, high = edges.T
@@ -593,7 +664,7 @@ class Engine:
         counts = crew.share(self._count_live, m, blocks.PART)
         begin = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
         n_live = int(begin[-1])
-        cost = None if self._cost is None else new_costs(n_live)
+        cost = None if self._cost is None else np.empty(kernels.cost.COLUMNS * n_live, np.float32)
         place, origin = np.empty(m, np.int32), np.empty(n_live, np.int32)
         live = surface._replace(
             corner_vertex=np.empty(3 * n_live, np.int32),
@@ -617,7 +688,7 @@ class Engine:
             if self._cells is not None:
                 self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
         self._surface, self._cost, self._face_origin = live, cost, origin
-        self._listed = np.arange(n_live, dtype=np.int32)
+        self._listed = self._listed[:n_live]
 
     def _count_live(self, part: slice) -> int:
         corner_vertex = self._surface.corner_vertex

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from tetsimplify import kernels
 from tetsimplify.crew import Crew
 from tetsimplify.mesh import Mesh
+
+PART = 2**17  # vertices or faces in a task for a thread
+GROUP_BITS = 17  # faces are sorted by so many groups of their first vertices, at most
 
 
 class Arrangement(NamedTuple):
@@ -29,11 +33,12 @@ class Arrangement(NamedTuple):
         return self.vertex_origin is self.vertex_place
 
 
-def as_given(mesh: Mesh) -> Arrangement:
+def as_given(mesh: Mesh, crew: Crew) -> Arrangement:
     """The order of the mesh itself; its arrays are copied."""
     vertices = np.arange(len(mesh.vertices), dtype=np.int32)
     faces = np.arange(len(mesh.faces), dtype=np.int32)
-    return Arrangement(Mesh(mesh.vertices.copy(), mesh.faces.copy()), vertices, vertices, faces)
+    copies = Mesh(_copy(mesh.vertices, crew), _copy(mesh.faces, crew))
+    return Arrangement(copies, vertices, vertices, faces)
 
 
 def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
@@ -42,19 +47,93 @@ def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
     So a run of faces is a compact piece of the surface, which fits a cache and has few edges in
     common with other runs.
     """
-    low, high = kernels.order.bounds(mesh.vertices)
+    n, m = len(mesh.vertices), len(mesh.faces)
+    coded = _sorted_along_curve(mesh.vertices, crew)
+    vertex_origin, vertex_place = np.empty(n, np.int32), np.empty(n, np.int32)
+    face_origin = np.empty(m, np.int32)
+    arranged = Mesh(np.empty((n, 3)), np.empty((m, 3), np.int32))
+    shift = max(0, n.bit_length() - GROUP_BITS)
+
+    def number(part: slice) -> None:
+        kernels.order.number_in_order(
+            *(coded, mesh.vertices, part.start, part.stop),
+            *(vertex_origin, vertex_place, arranged.vertices),
+        )
+
+    def count(part: slice, n_faces: NDArray[np.int32]) -> None:
+        kernels.order.count_groups(mesh.faces, vertex_place, shift, part.start, part.stop, n_faces)
+
+    def sort(part: slice, begin: NDArray[np.int32]) -> None:
+        kernels.order.sort_by_group(
+            *(mesh.faces, vertex_place, shift, part.start, part.stop),
+            *(begin, face_origin, arranged.faces),
+        )
+
+    crew.share(number, n, PART)
+    _sort(count, sort, m, 2**GROUP_BITS, crew)
+    return Arrangement(arranged, vertex_origin, vertex_place, face_origin)
+
+
+def _sorted_along_curve(vertices: NDArray[np.float64], crew: Crew) -> NDArray[np.int64]:
+    """Vertices along a Z-order curve, and in a cell by number; coded as of `find_codes`."""
+    low, high = kernels.order.bounds(vertices)
     extent = float((high - low).max())
     scale = kernels.order.N_CELLS / extent if extent > 0.0 else 0.0
-    vertex_origin = kernels.order.sort_vertices(mesh.vertices, low, scale)
-    vertex_place = np.empty_like(vertex_origin)
-    vertex_place[vertex_origin] = np.arange(len(vertex_origin), dtype=np.int32)
+    given, sorted_once = np.empty(len(vertices), np.int64), np.empty(len(vertices), np.int64)
 
-    def sort_faces() -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        face_origin, faces = kernels.order.sort_faces(mesh.faces, vertex_place)
-        return face_origin, faces
+    def find(part: slice) -> None:
+        kernels.order.find_codes(vertices, low, scale, part.start, part.stop, given)
 
-    def copy_vertices() -> NDArray[np.float64]:
-        return mesh.vertices.take(vertex_origin, axis=0)
+    crew.share(find, len(vertices), PART)
+    _sort_by_digit(given, 0, sorted_once, crew)
+    _sort_by_digit(sorted_once, kernels.order.DIGIT, given, crew)
+    return given
 
-    (face_origin, faces), vertices = crew.do_both(sort_faces, copy_vertices)
-    return Arrangement(Mesh(vertices, faces), vertex_origin, vertex_place, face_origin)
+
+def _sort_by_digit(coded: NDArray[np.int64], shift: int, to: NDArray[np.int64], crew: Crew) -> None:
+    """Sort codes by a few of their bits."""
+
+    def count(part: slice, n: NDArray[np.int32]) -> None:
+        kernels.order.count_digits(coded, shift, part.start, part.stop, n)
+
+    def sort(part: slice, begin: NDArray[np.int32]) -> None:
+        kernels.order.sort_by_digit(coded, shift, part.start, part.stop, begin, to)
+
+    _sort(count, sort, len(coded), 2**kernels.order.DIGIT, crew)
+
+
+def _sort(
+    count: Callable[[slice, NDArray[np.int32]], None],
+    sort: Callable[[slice, NDArray[np.int32]], None],
+    n_items: int,
+    n_keys: int,
+    crew: Crew,
+) -> None:
+    """Sort by counting, each thread a part: what has the same key stays in its order.
+
+    Parameters
+    ----------
+    count : callable
+        Counts how often each key occurs in a part.
+    sort : callable
+        Puts the items of a part where those of each key begin.
+    n_items, n_keys : int
+    crew : Crew
+    """
+    at_once = max(1, -(-n_items // crew.n_threads))
+    n = np.zeros((crew.n_threads, n_keys), np.int32)
+    crew.share(lambda part: count(part, n[part.start // at_once]), n_items, at_once)
+    ends = np.cumsum(n.T, dtype=np.int32).reshape(n_keys, -1)  # by the key, then by the part
+    begin = np.ascontiguousarray((ends - n.T).T)
+    crew.share(lambda part: sort(part, begin[part.start // at_once]), n_items, at_once)
+
+
+def _copy(array: NDArray[Any], crew: Crew) -> NDArray[Any]:
+    """A copy, made in threads."""
+    to = np.empty_like(array)
+
+    def copy(part: slice) -> None:
+        to[part] = array[part]
+
+    crew.share(copy, len(array), PART)
+    return to

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import mmap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +30,25 @@ AT_ONCE = 2**16  # vertices in a task for a thread
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
 
 
+class Start(NamedTuple):
+    """A surface before the first contraction."""
+
+    surface: Surface
+    topology: TopologyReport
+    first_corner: NDArray[np.int32]
+    """Shape (n,): a corner of each vertex, -1 where it has none."""
+    on_loops: NDArray[np.intp]
+    """The boundary vertices."""
+
+
 def start_surface(
     given: Mesh,
     arranged: Arrangement,
     options: Options,
     locked: NDArray[np.bool_] | NDArray[np.uint8],
     threads: int | None = None,
-) -> tuple[Surface, TopologyReport, NDArray[np.int32]]:
-    """The corner table of a mesh, its topology, and a corner of each vertex.
+) -> Start:
+    """The corner table of a mesh, and its topology.
 
     Parameters
     ----------
@@ -67,7 +78,15 @@ def start_surface(
     unused = np.sort(arranged.vertex_origin[report.unreferenced_vertices])
     report = dataclasses.replace(report, unreferenced_vertices=unused)
 
-    held = _held_boundary(mesh.vertices, corner_vertex, next_corner, loop, options.boundary)
+    on_loops = np.flatnonzero(loop >= 0)
+    held = np.zeros(n, np.uint8)
+    if locked.any():
+        held[:] = locked[arranged.vertex_origin]
+    if options.boundary != "simplify":
+        is_held = _is_held(
+            mesh.vertices, corner_vertex, next_corner, loop, on_loops, options.boundary
+        )
+        held[on_loops] = np.maximum(held[on_loops], is_held)
     n_loops = max(1, report.n_boundary_loops)
     surface: Surface = kernels.state.Surface(
         vertices=mesh.vertices,
@@ -80,63 +99,63 @@ def start_surface(
         loop=loop,
         loop_size=np.zeros(n_loops, np.int32),
         loop_home=np.zeros(n_loops, np.int32),
-        locked=np.maximum(locked[arranged.vertex_origin], held).astype(np.uint8),
+        locked=held,
         merges=np.empty((n, 2)),
     )
-    kernels.loops.count_loop_edges(surface.loop, surface.merged_into, surface.loop_size)
-    return surface, report, first_corner
+    kernels.loops.count_loop_edges(on_loops, loop, surface.loop_size)
+    return Start(surface, report, first_corner, on_loops)
 
 
-def _held_boundary(
+def _is_held(
     vertices: NDArray[np.float64],
     corner_vertex: NDArray[np.int32],
     next_corner: NDArray[np.int32],
     loop: NDArray[np.int32],
+    on_loops: NDArray[np.intp],
     boundary: str,
 ) -> NDArray[np.bool_]:
-    """Boundary vertices that have to stay: all, or those where the boundary turns."""
-    held: NDArray[np.bool_] = loop >= 0
-    if boundary == "simplify" or not held.any():
-        return np.zeros_like(held)
-    if boundary == "keep":
-        before, after = np.arange(len(loop)), np.arange(len(loop))
-        kernels.rings.boundary_neighbours(corner_vertex, next_corner, loop, before, after)
-        come, go = vertices - vertices[before], vertices[after] - vertices
-        ahead = np.einsum("ij,ij->i", come, go)
-        aside = np.linalg.norm(np.cross(come, go), axis=1)
-        held &= (ahead <= 0.0) | (aside > STRAIGHT * ahead)
-    return held
+    """Which boundary vertices have to stay: all, or those where the boundary turns."""
+    if boundary == "lock":
+        return np.ones(len(on_loops), np.bool_)
+    before, after = np.arange(len(loop)), np.arange(len(loop))
+    kernels.rings.boundary_neighbours(corner_vertex, next_corner, loop, before, after)
+    here = vertices[on_loops]
+    come, go = here - vertices[before[on_loops]], vertices[after[on_loops]] - here
+    ahead = np.einsum("ij,ij->i", come, go)
+    aside = np.linalg.norm(np.cross(come, go), axis=1)
+    is_held: NDArray[np.bool_] = (ahead <= 0.0) | (aside > STRAIGHT * ahead)
+    return is_held
 
 
 def start_quadrics(
-    surface: Surface,
-    first_corner: NDArray[np.int32],
+    start: Start,
     options: Options,
     bound: NDArray[np.float64] | None,
     crew: Crew,
 ) -> Quadrics:
-    """The quadrics of all faces, and of boundary and feature edges; see kernels/quadrics.py.
+    """The quadrics of all faces, and of boundary and feature edges, beside the positions.
+
+    See kernels/quadrics.py.
 
     Parameters
     ----------
-    surface : Surface
-    first_corner : ndarray, shape (n,), int32
-        A corner of each vertex, -1 where it has none.
+    start : Start
     options : Options
     bound : ndarray, shape (n,), float64, optional
         Largest quadric error that each vertex may come to, instead of that of the options. None is
         small enough for a negative one.
     crew : Crew
     """
+    surface, _, first_corner, on_loops = start
     n = len(surface.vertices)
     limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
     quadrics = new_quadrics(n)
-    max_error2 = quadrics.origin[:, kernels.quadrics.MAX_ERROR2]
-    max_error2[:] = limit if bound is None else bound
-    max_error2 *= np.abs(max_error2)
     unit = _weight_unit(surface)
 
     def sum_faces(part: slice) -> None:
+        quadrics.origin.view(np.float64)[part, :3] = surface.vertices[part]
+        largest = limit if bound is None else bound[part]
+        quadrics.origin[part, kernels.quadrics.MAX_ERROR2] = largest * np.abs(largest)
         kernels.quadrics.sum_faces(
             *(surface.vertices, surface.corner_vertex, surface.next_corner, first_corner),
             *(unit, part.start, part.stop, quadrics),
@@ -146,7 +165,7 @@ def start_quadrics(
     sharp = -1.0
     if options.feature_angle is not None:
         sharp = math.cos(math.radians(options.feature_angle))
-    begins = np.flatnonzero((surface.loop >= 0) | (sharp > -1.0)).astype(np.int32)
+    begins = on_loops if sharp == -1.0 else np.arange(n)
     weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
     kernels.quadrics.add_creases(surface, first_corner, begins, quadrics.matrix, *weights, sharp)
     return quadrics
@@ -160,24 +179,20 @@ def _weight_unit(surface: Surface) -> float:
 
 
 def new_quadrics(n_vertices: int) -> Quadrics:
-    """Quadrics of so many vertices, all zero, each in one line of a cache."""
-    width = CACHE_LINE // 8
-    memory = np.zeros((n_vertices + 1) * width)
-    first = -(memory.ctypes.data // 8) % width
-    matrix = memory[first : first + n_vertices * width].reshape(n_vertices, width)
+    """Quadrics of so many vertices, all zero."""
+    matrix, places = _cache_lines(n_vertices), _cache_lines(n_vertices)
     quadrics: Quadrics = kernels.quadrics.Quadrics(
-        matrix=matrix,
-        linear=matrix.view(np.float32),
-        origin=np.zeros((n_vertices, 8), np.float32),
+        matrix=matrix, linear=matrix.view(np.float32), origin=places.view(np.float32)
     )
     return quadrics
 
 
-def new_costs(n_faces: int) -> NDArray[np.float32]:
-    """Rows of costs of the edges of so many faces, none of them up to date."""
-    costs = np.full((n_faces, kernels.cost.COLUMNS), np.inf, np.float32)
-    costs[:, kernels.cost.LEAST] = -np.inf
-    return costs.reshape(-1)
+def _cache_lines(n: int) -> NDArray[np.float64]:
+    """So many lines of a cache, all zero, shape (n, 8)."""
+    width = CACHE_LINE // 8
+    memory = np.zeros((n + 1) * width)
+    first = -(memory.ctypes.data // 8) % width
+    return memory[first : first + n * width].reshape(n, width)
 
 
 def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:

@@ -196,7 +196,7 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
     n_boundary = n_degenerate = 0
     defects = kernels.defects.none()
     if n_left:
-        rest = np.flatnonzero(found.left).astype(np.int32)
+        rest = np.flatnonzero(found.left != kernels.surface.SETTLED).astype(np.int32)
         arcs, slot = np.empty((4, longest + 1), np.int32), np.empty(n_vertices, np.int32)
         n_more, n_boundary, n_degenerate, n_irregular = kernels.surface.survey_rest(
             corner_vertex, found, rest, arcs, slot

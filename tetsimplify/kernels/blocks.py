@@ -1,17 +1,26 @@
 """Blocks of faces, made of cells: pieces of the surface that were numbered along a curve."""
 
+import numpy as np
+
 from tetsimplify.kernels.corners import DEAD
-from tetsimplify.kernels.jit import kernel_in_place
+from tetsimplify.kernels.jit import kernel_in_place, part
 
 SHARED = -1  # no block has all faces of the vertex
 
 
+@part
+def _cell_of(cells, f):
+    """The cell of a face; the run that it is in, where there is no list of cells."""
+    cell, bits = cells
+    return np.int64(cell[f]) if cell.size else f >> bits
+
+
 @kernel_in_place
-def count_live(corner_vertex, cell, first, last, n_faces):
+def count_live(corner_vertex, cells, first, last, n_faces):
     """Count the live ones of the faces from `first` to `last` in each cell."""
     for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
-            n_faces[cell[f]] += 1
+            n_faces[_cell_of(cells, f)] += 1
 
 
 @kernel_in_place
@@ -54,11 +63,11 @@ def put_in_blocks(n_faces, least, block_of, place, begin):
 
 
 @kernel_in_place
-def list_faces(corner_vertex, cell, block_of, first, last, place, vertex_block, listed):
+def list_faces(corner_vertex, cells, block_of, first, last, place, vertex_block, listed):
     """List live faces block by block, and note a block of each vertex: any of those it is in."""
     for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
-            block = block_of[cell[f]]
+            block = block_of[_cell_of(cells, f)]
             listed[place[block]] = f
             place[block] += 1
             for corner in range(3 * f, 3 * f + 3):
@@ -66,11 +75,11 @@ def list_faces(corner_vertex, cell, block_of, first, last, place, vertex_block, 
 
 
 @kernel_in_place
-def find_shared(corner_vertex, cell, block_of, first, last, vertex_block):
+def find_shared(corner_vertex, cells, block_of, first, last, vertex_block):
     """Find the vertices that have faces in another block than the one noted."""
     for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
-            block = block_of[cell[f]]
+            block = block_of[_cell_of(cells, f)]
             for corner in range(3 * f, 3 * f + 3):
                 if vertex_block[corner_vertex[corner]] != block:
                     vertex_block[corner_vertex[corner]] = SHARED

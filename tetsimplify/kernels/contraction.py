@@ -72,7 +72,7 @@ def contract_simple(surface, quadrics, watch, scratch, rules, cost, corner, colo
     if quadrics is not None:
         prefetch_row(quadrics.matrix, v)
         prefetch_row(quadrics.matrix, u)
-    n_v, n_u, n_doomed, n_common = gather_stars(surface, quadrics, scratch, rules, corner)
+    n_v, n_u, n_doomed, n_common = gather_stars(surface, scratch, rules, corner)
     if rules.blocked != VIOLATE:
         allowed = link_condition(surface, block, v, u, n_v, n_u, n_doomed, n_common)
         if allowed != CONTRACTIBLE:

@@ -31,7 +31,7 @@ from tetsimplify.kernels.state import (
 
 
 @part
-def gather_stars(surface, quadrics, scratch, rules, corner):
+def gather_stars(surface, scratch, rules, corner):
     """Collect the stars of the ends v, u of the edge that begins at `corner`.
 
     The corners that survive a simple contraction go to STAR, those of v first, the faces that it
@@ -49,14 +49,14 @@ def gather_stars(surface, quadrics, scratch, rules, corner):
     stamp = scratch.tally[STAMP] + 2
     scratch.tally[STAMP] = stamp
     if surface.loop[v] < 0 and surface.loop[u] < 0 and rules.blocked != VIOLATE:
-        return _go_around(surface, quadrics, scratch, corner, v, u, stamp)
+        return _go_around(surface, scratch, corner, v, u, stamp)
     n_v, n_u, n_doomed, n_common = _gather_in_any_order(surface, scratch, corner, v, u, stamp)
     list_ring(surface, scratch, n_v, n_u)
     return n_v, n_u, n_doomed, n_common
 
 
 @part
-def _go_around(surface, quadrics, scratch, corner, v, u, stamp):
+def _go_around(surface, scratch, corner, v, u, stamp):
     r"""Collect the stars of two vertices inside the surface: around v, then around u.
 
        x -- .            The corners of v begin after the face vux and end before vyu,
@@ -81,7 +81,7 @@ def _go_around(surface, quadrics, scratch, corner, v, u, stamp):
         n += p != DEAD
         p = np.uint32(p if p != DEAD else v)
         mark[p] = stamp
-        _will_be_read(surface, quadrics, p)
+        prefetch_row(surface.vertices, p)  # the guards read it
         c = next_corner[np.uint32(c)]
     doomed[1] = face_of(c)
     n_v = n
@@ -96,20 +96,12 @@ def _go_around(surface, quadrics, scratch, corner, v, u, stamp):
         p = p if p != DEAD else y
         n += p != y
         n_common += (p != y) & (mark[np.uint32(p)] == stamp)
-        _will_be_read(surface, quadrics, np.uint32(p))
+        prefetch_row(surface.vertices, np.uint32(p))
         if p == x:
             break
         c = next_corner[np.uint32(c)]
     scratch.tally[RING_V], scratch.tally[RING_ALL], scratch.tally[N_GAPS] = n_v, n, 0
     return n_v, n - n_v, 2, n_common
-
-
-@part
-def _will_be_read(surface, quadrics, v):
-    """Start to fetch what the guards read of a vertex around the edge."""
-    prefetch_row(surface.vertices, v)
-    if quadrics is not None:
-        prefetch_row(quadrics.origin, v)
 
 
 @cold_part

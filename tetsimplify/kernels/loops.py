@@ -7,19 +7,27 @@ UNSEEN = -2  # no vertex of the loop yet
 
 
 @kernel_in_place
-def count_loop_edges(loop, merged_into, size):
-    """Count the edges, which are as many as the vertices, of every boundary loop."""
-    size[:] = 0
-    for v in range(loop.size):
-        if loop[v] >= 0 and merged_into[v] == v:
-            size[loop[v]] += 1
+def follow_merges(merged_into, on_loops):
+    """Replace boundary vertices by what they were merged into, -1 where that was removed."""
+    for i in range(on_loops.size):
+        v = on_loops[i]
+        while v >= 0 and merged_into[v] != v:
+            v = merged_into[v]
+        on_loops[i] = v
 
 
 @kernel_in_place
-def find_loop_homes(loop, merged_into, vertex_block, home):
+def count_loop_edges(on_loops, loop, size):
+    """Count the edges, which are as many as the vertices, of every boundary loop."""
+    size[:] = 0
+    for v in on_loops:
+        size[loop[v]] += 1
+
+
+@kernel_in_place
+def find_loop_homes(on_loops, loop, vertex_block, home):
     """Tell the block that has all faces at a boundary loop, SHARED where there is none such."""
     home[:] = UNSEEN
-    for v in range(loop.size):
-        if loop[v] >= 0 and merged_into[v] == v:
-            known, block = home[loop[v]], vertex_block[v]
-            home[loop[v]] = block if known == UNSEEN or known == block else SHARED
+    for v in on_loops:
+        known, block = home[loop[v]], vertex_block[v]
+        home[loop[v]] = block if known == UNSEEN or known == block else SHARED

@@ -5,6 +5,7 @@ import numpy as np
 from tetsimplify.kernels.jit import kernel, kernel_in_place, part
 
 N_CELLS = 2**10  # along an axis, for the order of the vertices
+DIGIT = 15  # bits: vertices are sorted by two digits
 
 
 @part
@@ -39,9 +40,9 @@ def bounds(vertices):
     return box
 
 
-@kernel
-def sort_vertices(vertices, low, scale):
-    """Sort vertices along a Z-order curve through N_CELLS cells a side, and in a cell by number.
+@kernel_in_place
+def find_codes(vertices, low, scale, first, last, coded):
+    """Find the places of vertices on a Z-order curve through N_CELLS cells a side.
 
     Parameters
     ----------
@@ -49,52 +50,83 @@ def sort_vertices(vertices, low, scale):
         The corner of the first cell.
     scale : float
         Cells in a unit of length.
-
-    Returns
-    -------
-    int32 (n,)
-        The vertices in their order.
+    first, last : int
+        Which vertices.
+    coded : int64 (n,), out
+        The place, in the upper half, and the number of the vertex.
     """
-    n = len(vertices)
-    codes = np.empty(n, np.int32)
-    for v in range(n):
-        codes[v] = _morton(vertices, v, low, scale, N_CELLS - 1)
-    order, sorted_order = np.arange(n, dtype=np.int32), np.empty(n, np.int32)
-    for shift in (0, 15):  # by the lower halves of the codes, then by the upper ones
-        first = np.zeros(2**15 + 1, np.int32)
-        for v in range(n):
-            first[((codes[v] >> shift) & 0x7FFF) + 1] += 1
-        for half in range(2**15):
-            first[half + 1] += first[half]
-        for i in range(n):
-            half = (codes[order[i]] >> shift) & 0x7FFF
-            sorted_order[first[half]] = order[i]
-            first[half] += 1
-        order, sorted_order = sorted_order, order
-    return order
+    for v in range(first, last):
+        coded[v] = np.int64(_morton(vertices, v, low, scale, N_CELLS - 1)) << 32 | v
+
+
+@part
+def _digit(coded, shift):
+    """DIGIT bits of a place on the curve."""
+    return (coded >> (32 + shift)) & (2**DIGIT - 1)
 
 
 @kernel_in_place
-def find_cells(vertices, faces, low, scale, most, first, last, cell, is_used):
-    """Find the cells of a Z-order curve that the first corners of faces lie in.
+def count_digits(coded, shift, first, last, n):
+    """Count how often each digit occurs."""
+    for i in range(first, last):
+        n[_digit(coded[i], shift)] += 1
+
+
+@kernel_in_place
+def sort_by_digit(coded, shift, first, last, begin, to):
+    """Sort by a digit, and what has the same one in the order in which it is."""
+    for i in range(first, last):
+        digit = _digit(coded[i], shift)
+        to[begin[digit]] = coded[i]
+        begin[digit] += 1
+
+
+@kernel_in_place
+def number_in_order(coded, vertices, first, last, origin, place, to):
+    """Tell vertices their numbers in the order of the codes, and copy them there."""
+    for i in range(first, last):
+        v = np.int32(coded[i] & 0x7FFFFFFF)
+        origin[i] = v
+        place[v] = i
+        for axis in range(3):
+            to[i, axis] = vertices[v, axis]
+
+
+@kernel_in_place
+def find_cells(vertices, low, scale, most, first, last, cell):
+    """Find the cells of a Z-order curve that vertices lie in.
 
     Parameters
     ----------
     low, scale
-        As of :func:`sort_vertices`.
+        As of :func:`find_codes`.
     most : int
         Number of the last cell along an axis.
     first, last : int
+        Which vertices.
+    cell : int32 (n,), out
+        Numbers along the curve.
+    """
+    for v in range(first, last):
+        cell[v] = _morton(vertices, v, low, scale, most)
+
+
+@kernel_in_place
+def take_cells(faces, of_vertices, first, last, cell, is_used):
+    """Give faces the cells of their first corners.
+
+    Parameters
+    ----------
+    of_vertices : int32 (n,)
+    first, last : int
         Which faces.
     cell : int32 (m,), out
-        Of each face, numbered along the curve.
-    is_used : int32 (n,), out
+    is_used : int32, out
         1 for these cells.
     """
     for f in range(first, last):
-        code = _morton(vertices, faces[f, 0], low, scale, most)
-        cell[f] = code
-        is_used[code] = 1
+        cell[f] = of_vertices[faces[f, 0]]
+        is_used[cell[f]] = 1
 
 
 @kernel_in_place
@@ -115,33 +147,37 @@ def renumber(number, first, last, cell):
         cell[f] = number[cell[f]]
 
 
-@kernel
-def sort_faces(faces, place):
-    """Sort faces by the first of their vertices.
+@kernel_in_place
+def count_groups(faces, place, shift, first, last, n):
+    """Count the faces whose first corners are among each 2**shift vertices in order."""
+    for f in range(first, last):
+        n[min(place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]) >> shift] += 1
+
+
+@kernel_in_place
+def sort_by_group(faces, place, shift, first, last, begin, origin, to):
+    """Sort faces so that those come together whose first corners do.
 
     Parameters
     ----------
     faces : int32 (m, 3)
     place : int32 (n,)
         Where each vertex comes in the order of the vertices.
-
-    Returns
-    -------
-    order : int32 (m,)
+    shift : int
+        As of :func:`count_groups`.
+    first, last : int
+        Which faces.
+    begin : int32
+        Where they go, by the group.
+    origin : int32 (m,), out
         The faces in their order.
-    arranged : int32 (m, 3)
+    to : int32 (m, 3), out
         The same with the places of their vertices.
     """
-    first = np.zeros(place.size + 1, np.int32)
-    for f in range(len(faces)):
-        first[min(place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]) + 1] += 1
-    for v in range(place.size):
-        first[v + 1] += first[v]
-    order, arranged = np.empty(len(faces), np.int32), np.empty((len(faces), 3), np.int32)
-    for f in range(len(faces)):
+    for f in range(first, last):
         a, b, c = place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]
-        at = first[min(a, b, c)]
-        first[min(a, b, c)] += 1
-        order[at] = f
-        arranged[at, 0], arranged[at, 1], arranged[at, 2] = a, b, c
-    return order, arranged
+        group = min(a, b, c) >> shift
+        at = begin[group]
+        begin[group] += 1
+        origin[at] = f
+        to[at, 0], to[at, 1], to[at, 2] = a, b, c

@@ -25,17 +25,17 @@ from tetsimplify.kernels.state import ERROR
 
 
 class Quadrics(NamedTuple):
-    """The quadrics of vertices: each in one line of a cache, and where it comes from."""
+    """The quadrics of vertices, and where they come from: each in one line of a cache."""
 
     matrix: np.ndarray  # float64 (n, 8): the upper half of A by rows; the last two columns are
     linear: np.ndarray  # float32 (n, 16): b and c, in the last four columns; the same memory
-    origin: np.ndarray  # float32 (n, 8): columns below
+    origin: np.ndarray  # float32 (n, 16): columns below, beside the positions in the same memory
 
 
 LINEAR, CONSTANT = 12, 15  # columns of `linear`
-# Columns of `origin`: the largest mean squared distance allowed; sums of the original normals, by
-# area, and of the areas.
-MAX_ERROR2, NORMAL, AREA = 0, 1, 4
+# Columns of `origin`, after the position, which takes six: the largest mean squared distance
+# allowed; sums of the original normals, by area, and of the areas.
+MAX_ERROR2, NORMAL, AREA = 6, 7, 10
 
 # The optimum is held to the middle of the edge by a spring of this part of the weight: in
 # directions in which the planes do not decide, the middle does. So the solution is always well
@@ -184,20 +184,20 @@ def merge_quadrics(surface, quadrics, scratch, v, u):
 
 
 @kernel_in_place
-def vertex_errors(quadrics, merged_into, number, errors):
+def vertex_errors(quadrics, number, first, last, errors):
     """Root mean squared distances of the vertices that are left from the planes of their quadrics.
 
     Parameters
     ----------
-    merged_into : int32 (n,)
-        Each vertex that was not merged has its own number there.
     number : int32 (n,)
         New numbers of the vertices, -1 where they are not in use.
+    first, last : int
+        Which vertices.
     errors : float64, out
         In the new order.
     """
-    for v in range(number.size):
-        if merged_into[v] == v and number[v] >= 0:
+    for v in range(first, last):
+        if number[v] >= 0:
             weight_v = weight(quadrics, v)
             error2 = quadrics.linear[v, CONSTANT]
             errors[number[v]] = np.sqrt(error2 / weight_v) if weight_v > 0.0 else 0.0

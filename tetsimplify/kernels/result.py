@@ -31,7 +31,7 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
     begin : int
         How many live faces come before.
     place : int32 (m,), out
-        Where each live face goes.
+        Where each live face goes, -1 for a dead one.
     to : Surface
         What they are copied to.
     to_cost, to_origin
@@ -39,9 +39,10 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
     """
     n = begin
     for f in range(first, last):
-        if surface.corner_vertex[3 * f] == DEAD:
+        is_live = surface.corner_vertex[3 * f] != DEAD
+        place[f] = n if is_live else -1
+        if not is_live:
             continue
-        place[f] = n
         for k in range(3):
             to.corner_vertex[3 * n + k] = surface.corner_vertex[3 * f + k]
             to.verdict[3 * n + k] = surface.verdict[3 * f + k]
@@ -56,42 +57,74 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
 @kernel_in_place
 def copy_links(surface, first, last, place, to):
     """Link the corners of the live ones of the faces from `first` to `last`, in the same order."""
-    corner_vertex, next_corner = surface.corner_vertex, surface.next_corner
+    next_corner = surface.next_corner
     for f in range(first, last):
-        if corner_vertex[3 * f] == DEAD:
-            continue
         n = place[f]
+        if n < 0:
+            continue
         for k in range(3):
             c = np.uint32(next_corner[3 * f + k])
-            while corner_vertex[c] == DEAD:
+            while place[c // np.uint32(3)] < 0:
                 c = np.uint32(next_corner[c])
             across = c // np.uint32(3)
             to.next_corner[3 * n + k] = 3 * place[across] + (c - np.uint32(3) * across)
 
 
 @kernel_in_place
-def number_vertices(corner_vertex, visit, number):
-    """Number the vertices that faces use; return how many there are.
-
-    Parameters
-    ----------
-    visit : int32 (n,)
-        The vertices in the order in which they get their numbers.
-    number : int32 (n,)
-        Filled with -1. Receives the number of each vertex in use.
-    """
+def mark_vertices(corner_vertex, is_used):
+    """Mark the vertices that corners have with 1."""
     for corner in range(corner_vertex.size):
-        number[corner_vertex[corner]] = 0
-    n = 0
-    for v in visit:
-        if number[v] == 0:
-            number[v] = n
-            n += 1
-    return n
+        is_used[corner_vertex[corner]] = 1
 
 
 @kernel_in_place
-def follow_merges(merged_into, number, first, last, of_target):
+def number_vertices(visit, is_used, n, number):
+    """Number the vertices in use in the order in which they are visited, from `n` on.
+
+    Parameters
+    ----------
+    visit : int32 (k,)
+    is_used : uint8 (n,)
+    number : int32 (n,), out
+        -1 where a vertex is not in use.
+    """
+    for v in visit:
+        number[v] = n if is_used[v] else -1
+        n += is_used[v]
+
+
+@kernel_in_place
+def note_places(origin, first, last, place):
+    """Note where each of the faces from `first` to `last` is, by the number that it was given."""
+    for i in range(first, last):
+        place[origin[i]] = i
+
+
+@kernel_in_place
+def copy_in_order(corner_vertex, place, first, n, faces, face_map):
+    """Copy faces, in order, from the n-th one on.
+
+    Parameters
+    ----------
+    place : int32 (k,)
+        Where each face is, -1 where it is gone.
+    first : int
+        The number that the first of them was given.
+    n : int
+    faces : int32 (m, 3), out
+    face_map : int32 (m,), out
+        The numbers that they were given.
+    """
+    for i in range(place.size):
+        if place[i] >= 0:
+            for k in range(3):
+                faces[n, k] = corner_vertex[3 * place[i] + k]
+            face_map[n] = first + i
+            n += 1
+
+
+@kernel_in_place
+def follow_merges(merged_into, number, visit, of_target):
     """Tell vertices the number of what they were merged into; -1 where that is gone.
 
     Parameters
@@ -99,25 +132,30 @@ def follow_merges(merged_into, number, first, last, of_target):
     merged_into : int32 (n,)
         Vertex that each one was merged into, itself where it was not, -1 where removed.
     number : int32 (n,)
-        Of the vertices in use.
-    first, last : int
+        Of the vertices in use, -1 of the others.
+    visit : int32 (k,)
         Which vertices.
-    of_target : int32 (n,), out
+    of_target : int32 (k,), out
     """
-    for v in range(first, last):
-        w = v
+    for i in range(visit.size):
+        w = visit[i]
         while merged_into[w] >= 0 and merged_into[w] != w:
             w = merged_into[w]
-        of_target[v] = number[w] if merged_into[w] >= 0 else -1
+        of_target[i] = number[w]
 
 
 @kernel_in_place
-def copy_vertices(vertices, number, merged_into, corner_vertex, out):
-    """Copy the vertices that are in use to their new places and renumber the corners."""
-    for v in range(number.size):
-        if merged_into[v] == v and number[v] >= 0:
+def copy_vertices(vertices, number, first, last, out):
+    """Copy those of the vertices from `first` to `last` that are in use to their new places."""
+    for v in range(first, last):
+        if number[v] >= 0:
             for axis in range(3):
                 out[number[v], axis] = vertices[v, axis]
+
+
+@kernel_in_place
+def renumber_corners(number, corner_vertex):
+    """Give corners the new numbers of their vertices."""
     for corner in range(corner_vertex.size):
         corner_vertex[corner] = number[corner_vertex[corner]]
 

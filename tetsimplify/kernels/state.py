@@ -35,7 +35,7 @@ PATH, DISTANCE = 0, 1
 class Surface(NamedTuple):
     """The mesh while it is being contracted: a corner table and what goes with it."""
 
-    vertices: np.ndarray  # float64 (n, 3): positions
+    vertices: np.ndarray  # float64 (n, 3 or more): positions first, see quadrics.py
     corner_vertex: np.ndarray  # int32 (3 m,): vertex of each corner, DEAD of a dead face
     next_corner: np.ndarray  # int32 (3 m,): circular lists of the corners of each vertex
     face_state: np.ndarray  # uint8 (m,)
