@@ -54,13 +54,21 @@ def engine_of(mesh, threads=None, **options):
 MODES_OF_DIVISION = ({"keep_ratio": 0.1}, {"max_edge_length": 1.0})  # along a curve, in runs
 
 
-def blocks_of_vertices(engine, divided):
+def faces_listed(engine, division):
+    """The faces block by block."""
+    in_order = np.arange(len(engine._surface.face_state))
+    return division.listed[: engine.n_faces] if len(division.listed) else in_order
+
+
+def blocks_of_vertices(engine, division):
     """The blocks of the faces around every vertex, from the lists of faces alone."""
     faces = engine._surface.corner_vertex.reshape(-1, 3)
+    listed = faces_listed(engine, division)
     around = [set() for _ in range(len(engine._surface.vertices))]
-    for first, last, _, block in divided:
-        for v in faces[engine._listed[first:last]].flat:
-            around[v].add(int(block))
+    for first, last, _, block in division.blocks:
+        for v in faces[listed[first:last]].flat:
+            if v != kernels.corners.DEAD:
+                around[v].add(int(block))
     return around
 
 
@@ -76,18 +84,19 @@ def test_every_face_is_in_one_block(small_blocks, mode, threads):
     in_runs = "max_edge_length" in mode
     for way in range(2):
         engine.n_sweeps = way
-        divided = engine._divide()
+        division = engine._divide()
+        divided = division.blocks
         assert len(divided) > 8
         assert divided[0, 0] == 0 and divided[-1, 1] == engine.n_faces
         assert (divided[1:, 0] == divided[:-1, 1]).all()
         sizes = divided[:, 1] - divided[:, 0]
         assert (sizes[1:-1] >= 120).all()
         assert (60 <= sizes[0] < 120) if in_runs and way else sizes[0] >= 120
-        listed = engine._listed[: engine.n_faces]
+        listed = faces_listed(engine, division)
         assert np.array_equal(np.sort(listed), np.arange(engine.n_faces))
         assert not in_runs or np.array_equal(listed, np.arange(engine.n_faces))
         for of_vertex, around in zip(
-            engine._surface.vertex_block, blocks_of_vertices(engine, divided), strict=True
+            engine._surface.vertex_block, blocks_of_vertices(engine, division), strict=True
         ):
             assert {int(of_vertex)} == (around if len(around) == 1 else {kernels.blocks.SHARED})
 
@@ -129,13 +138,13 @@ def test_shuffled_meshes_are_put_in_order(small_blocks):
     shuffled[place] = vertices
     mesh = as_mesh(shuffled, place[faces][rng.permutation(len(faces))])
     arranged = by_locality(mesh, Crew(2))
-    assert np.array_equal(mesh.vertices[arranged.vertex_origin], arranged.mesh.vertices)
+    assert np.array_equal(mesh.vertices[arranged.vertex_origin], arranged.vertices)
     assert np.array_equal(
         arranged.vertex_origin[arranged.vertex_place], np.arange(len(mesh.vertices))
     )
-    origin = arranged.vertex_origin[arranged.mesh.faces]
+    origin = arranged.vertex_origin[arranged.faces]
     assert np.array_equal(origin, mesh.faces[arranged.face_origin])
-    a, b, _ = arranged.mesh.faces.T
+    a, b, _ = arranged.faces.T
     assert np.median(np.abs(a - b)) < len(vertices) / 20 < np.median(np.abs(origin[:, 0] - b))
     assert_maps_fit(*mesh, tetsimplify.simplify(*mesh, max_edge_length=0.3))
 
@@ -267,7 +276,7 @@ def borders_of(mesh, options, way):
     """Where the blocks of a way meet, to be asked for the distance of points."""
     engine = engine_of(mesh, **options)
     engine.n_sweeps = way
-    assert len(engine._divide()) > 50
+    assert len(engine._divide().blocks) > 50
     is_between = engine._surface.vertex_block == kernels.blocks.SHARED
     return cKDTree(engine._surface.vertices[is_between, :3])
 

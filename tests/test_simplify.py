@@ -263,7 +263,7 @@ def normals_of(engine):
         a, b, c = surface.vertices[corner_vertex[face]]
         normal = np.cross(b - a, c - a)
         if np.linalg.norm(normal) > 1e-12:
-            normals[int(engine._face_origin[face])] = normal / np.linalg.norm(normal)
+            normals[face] = normal / np.linalg.norm(normal)
     return normals
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tetsimplify import kernels
 from tetsimplify.crew import Crew
+from tetsimplify.locality import IN_ORDER, Arrangement
 from tetsimplify.mesh import Mesh
 
 FACES = 2**13  # in a block, at least: what their contraction needs fits the cache of a core
@@ -34,14 +35,13 @@ SHIFT = 1.0 / 3.0  # of the extent, by which the cells of the second way are shi
 
 Blocks = NDArray[np.int64]
 SPARE = 2  # the column
-IN_ORDER = np.empty(0, np.int32)  # instead of the cells of faces
 
 
 class Cells(NamedTuple):
     """The cells of the faces, in two ways."""
 
     of_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
-    """Shapes (m,); empty where cells are runs of 2**CELL_BITS faces in the order at hand."""
+    """Shapes (m,); IN_ORDER where cells are runs of 2**CELL_BITS faces as they are."""
     n_curve: int
     """How many cells there are along a curve, where they are no runs."""
     least: int
@@ -56,19 +56,18 @@ class Division(NamedTuple):
     """A surface divided into blocks."""
 
     blocks: Blocks
-    vertex_block: NDArray[np.int32]
-    """Shape (n,): the block that has all faces of each vertex, or SHARED."""
     listed: NDArray[np.int32]
-    """Shape (m,): the faces block by block."""
+    """The live faces block by block; IN_ORDER where these are runs of faces as they are."""
 
 
-def two_ways(mesh: Mesh, crew: Crew) -> Cells:
-    """Cells of a mesh whose faces are in the order of a Z-order curve.
+def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
+    """Cells of a mesh in the order of a Z-order curve.
 
     In the first way they follow that order, in the second one they are those of a shifted curve.
     """
-    n, m = len(mesh.vertices), len(mesh.faces)
-    low, high = kernels.order.bounds(mesh.vertices)
+    vertices, faces = arranged.vertices, arranged.faces
+    n, m = len(vertices), len(faces)
+    low, high = kernels.order.bounds(vertices)
     extent = float((high - low).max())
     bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / 2**CELL_BITS))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
@@ -77,10 +76,10 @@ def two_ways(mesh: Mesh, crew: Crew) -> Cells:
     number = np.zeros(2 ** (3 * bits), np.int32)
 
     def find(part: slice) -> None:
-        kernels.order.find_cells(mesh.vertices, *curve, part.start, part.stop, of_vertices)
+        kernels.order.find_cells(vertices, *curve, part.start, part.stop, of_vertices)
 
     def take(part: slice) -> None:
-        kernels.order.take_cells(mesh.faces, of_vertices, part.start, part.stop, shifted, number)
+        kernels.order.take_cells(faces, of_vertices, part.start, part.stop, shifted, number)
 
     def renumber(part: slice) -> None:
         kernels.order.renumber(number, part.start, part.stop, shifted)
@@ -92,21 +91,21 @@ def two_ways(mesh: Mesh, crew: Crew) -> Cells:
     return Cells((IN_ORDER, shifted), n_shifted, FACES, (FACES, FACES), AT_ONCE)
 
 
-def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division] | None:
+def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division, NDArray[np.int32]] | None:
     """Cells of a mesh as it is given: its blocks are runs of faces, which are shifted by half.
 
-    With the division in the first way. None where faces that follow one another lie apart, so that
-    much would be between the runs.
+    With the division in the first way, and the block of each vertex. None where faces that follow
+    one another lie apart, so that much would be between the runs.
     """
     m = len(mesh.faces)
     run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
     cells = Cells((IN_ORDER, IN_ORDER), 0, run, (run, run // 2), 1)
-    vertex_block, listed = np.zeros(len(mesh.vertices), np.int32), np.empty(m, np.int32)
-    blocks = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, listed, crew)
+    vertex_block = np.zeros(len(mesh.vertices), np.int32)
+    division = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, IN_ORDER, crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
     if n_shared > MOST_SHARED * len(vertex_block):
         return None
-    return cells, Division(blocks, vertex_block, listed)
+    return cells, division, vertex_block
 
 
 def copy_live(
@@ -137,9 +136,9 @@ def divide(
     way: int,
     corner_vertex: NDArray[np.int32],
     vertex_block: NDArray[np.int32],
-    listed: NDArray[np.int32],
+    room: NDArray[np.int32],
     crew: Crew,
-) -> Blocks:
+) -> Division:
     """Divide the live faces.
 
     Parameters
@@ -148,25 +147,24 @@ def divide(
     way : {0, 1}
     corner_vertex : ndarray, shape (3 m,), int32
     vertex_block : ndarray, shape (n,), int32
-        Filled: the block that has all faces of each vertex.
-    listed : ndarray, shape (m,), int32
-        Filled: the live faces block by block.
+        Filled: the block that has all faces of each vertex, or SHARED.
+    room : ndarray, shape (m,), int32
+        For a list of faces, where one is needed.
     crew : Crew
     """
     of_faces, m = (cells.of_faces[way], CELL_BITS), len(corner_vertex) // 3
-    n_cells = cells.n_curve if len(of_faces[0]) else (m >> CELL_BITS) + 1
+    in_order = not len(of_faces[0])
+    n_cells = (m >> CELL_BITS) + 1 if in_order else cells.n_curve
     n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
-    block_of, begin = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
-    place = np.empty_like(n_faces)
+    block_of, first_cell = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
 
     def count(part: slice) -> None:
         row = n_faces[part.start // PART]
         kernels.blocks.count_live(corner_vertex, of_faces, part.start, part.stop, row)
 
-    def put(part: slice) -> None:
-        row = place[part.start // PART]
-        kernels.blocks.list_faces(
-            *(corner_vertex, of_faces, block_of, part.start, part.stop, row, vertex_block, listed)
+    def note(part: slice) -> None:
+        kernels.blocks.note_blocks(
+            corner_vertex, of_faces, block_of, part.start, part.stop, vertex_block
         )
 
     def find_shared(part: slice) -> None:
@@ -174,17 +172,31 @@ def divide(
             corner_vertex, of_faces, block_of, part.start, part.stop, vertex_block
         )
 
+    def put(part: slice) -> None:
+        row = place[part.start // PART]
+        kernels.blocks.list_faces(
+            corner_vertex, of_faces, block_of, part.start, part.stop, row, room
+        )
+
     crew.share(count, m, PART)
-    sizes = cells.first[way], cells.least
-    n_blocks = kernels.blocks.put_in_blocks(n_faces, sizes, block_of, place, begin)
-    crew.share(put, m, PART)
+    n_blocks = kernels.blocks.put_in_blocks(
+        n_faces, (cells.first[way], cells.least), block_of, first_cell
+    )
+    first_cell = first_cell[: n_blocks + 1]
+    crew.share(note, m, PART)
     crew.share(find_shared, m, PART)
+    if in_order:
+        begin = np.minimum(first_cell.astype(np.int64) << CELL_BITS, m)
+    else:
+        begin, place = np.empty(n_blocks + 1, np.int64), np.empty_like(n_faces)
+        kernels.blocks.place_in_list(n_faces, first_cell, place, begin)
+        crew.share(put, m, PART)
 
     blocks = np.empty((n_blocks, 4), np.int64)
-    blocks[:, 0], blocks[:, 1] = begin[:n_blocks], begin[1 : n_blocks + 1]
+    blocks[:, 0], blocks[:, 1] = begin[:-1], begin[1:]
     blocks[:, SPARE] = UNLIMITED
     blocks[:, 3] = np.arange(n_blocks)
-    return blocks
+    return Division(blocks, IN_ORDER if in_order else room)
 
 
 def whole(n_faces: int, n_spare: int = UNLIMITED) -> Blocks:

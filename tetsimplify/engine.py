@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import blocks, kernels
+from tetsimplify.compaction import compact
 from tetsimplify.crew import Crew
 from tetsimplify.data import VertexWeights
+from tetsimplify.desks import Desks, Done, add_up
 from tetsimplify.edges import edge_extremes
-from tetsimplify.locality import Arrangement, as_given, by_locality
+from tetsimplify.locality import IN_ORDER, Arrangement, as_given, by_locality
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options, Progress
+from tetsimplify.outcome import collect, vertex_errors
 from tetsimplify.start import start_quadrics, start_scratch, start_surface
 
 if TYPE_CHECKING:
@@ -51,36 +53,30 @@ class Result(NamedTuple):
     merged into it; empty without quadrics."""
 
 
-def _arrange(
-    mesh: Mesh, options: Options, crew: Crew
-) -> tuple[Arrangement, blocks.Cells | None, blocks.Division | None]:
-    """The order to work in, the cells where the surface may be divided, and how if it is known."""
+class _Order(NamedTuple):
+    """The order to work in."""
+
+    arranged: Arrangement
+    cells: blocks.Cells | None = None
+    """Where the surface may be divided."""
+    division: blocks.Division | None = None
+    """The first one, where it is known."""
+    vertex_block: NDArray[np.int32] | None = None
+    """Shape (n,): the block of each vertex in that."""
+
+
+def _arrange(mesh: Mesh, options: Options, crew: Crew) -> _Order:
     can_divide = options.blocked != "violate" and options.intersections == "allow"
     in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
+    in_lines = options.uses_quadrics
     least = LEAST_BLOCKS * (blocks.RUN if in_runs else blocks.FACES)
     if not can_divide or len(mesh.faces) < least:
-        return as_given(mesh, crew), None, None
+        return _Order(as_given(mesh, crew, in_lines=in_lines))
     runs = blocks.runs(mesh, crew) if in_runs else None
     if runs is not None:
-        return as_given(mesh, crew), *runs
-    arranged = by_locality(mesh, crew)
-    return arranged, blocks.two_ways(arranged.mesh, crew), None
-
-
-class _Done(NamedTuple):
-    """What a task has done."""
-
-    n_contracted: int
-    tally: NDArray[np.int64]
-    merges: NDArray[np.float64]
-    deferred: NDArray[np.int32]
-
-
-class _Desk(NamedTuple):
-    """What a task works with, and the next one after it."""
-
-    scratch: Scratch
-    merges: NDArray[np.float64]
+        return _Order(as_given(mesh, crew, in_lines=in_lines), *runs)
+    arranged = by_locality(mesh, crew, in_lines=in_lines)
+    return _Order(arranged, blocks.two_ways(arranged, crew))
 
 
 class Engine:
@@ -124,21 +120,21 @@ class Engine:
         n, m = len(mesh.vertices), len(mesh.faces)
         self._crew = Crew(threads)
         self.n_threads = self._crew.n_threads
-        self._arranged, self._cells, self._division = _arrange(mesh, options, self._crew)
-        start = start_surface(mesh, self._arranged, options, locked, self.n_threads)
+        self._arranged, self._cells, self._division, vertex_block = _arrange(
+            mesh, options, self._crew
+        )
+        start = start_surface(mesh, self._arranged, options, locked, vertex_block, self.n_threads)
         self._surface, self.topology_before, _, self._on_loops = start
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
             self._quadrics = start_quadrics(start, options, arranged_bound, self._crew)
-            places = self._quadrics.origin.view(np.float64)
-            self._surface = self._surface._replace(vertices=places)
         self._cost = None
         if not options.has_one_threshold:  # none up to date: 0 is below every threshold
             self._cost = np.zeros(kernels.cost.COLUMNS * m, np.float32)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
-        self._listed = np.empty(m, np.int32) if self._division is None else self._division.listed
+        self._room = np.empty(0, np.int32)  # for the faces of blocks
         self.options, self.rules = options, options.rules()
         if bound is not None:
             self.rules = self.rules._replace(is_bounded=True)
@@ -150,12 +146,19 @@ class Engine:
         n_coned = n + self.topology_before.n_boundary_loops
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
-        self._desks: SimpleQueue[_Desk] = SimpleQueue()  # those that no task works at
+        self._desks = Desks(n_coned, keep_log=True)
+        if self._division is not None and not self.is_divided:
+            self._unite()
 
     @property
     def n_faces(self) -> int:
         """Number of live faces."""
         return self.tally("N_LIVE")
+
+    @property
+    def _n_rows(self) -> int:
+        """Number of faces, live and dead."""
+        return len(self._surface.face_state)
 
     @property
     def has_enough(self) -> bool:
@@ -208,14 +211,13 @@ class Engine:
             Try faces again all of whose short edges were refused before.
         progress : callable, optional
         """
-        listed = self._all_faces()
-        n_faces = len(listed)
+        n_faces = self._n_rows
         parts = blocks.parts(n_faces, FACES_AT_ONCE)
         self._let_all_be_looked_at()
         n_contracted = 0
         for i in range(len(parts)):
             part = parts[i : i + 1]
-            n_contracted += self._sweep(self._surface, self._scratch, listed, part, 1, retry)
+            n_contracted += self._sweep(self._surface, self._scratch, IN_ORDER, part, 1, retry)
             if progress is not None:  # every sweep is half of what is still to do
                 share = 1.0 - 0.5 * parts[i, 1] / max(1, n_faces)
                 progress("contract", 1.0 - 0.5**self.n_sweeps * share)
@@ -224,11 +226,11 @@ class Engine:
 
     def sweep_divided(self, progress: Progress | None = None) -> int:
         """Sweep over blocks until little is left in them; return the number of contractions."""
-        all_blocks = self._divide()
+        all_blocks, listed = self._divide()
         self._let_all_be_looked_at()
 
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
-            return self._sweep(surface, scratch, self._listed, some, MOST_SWEEPS, False)
+            return self._sweep(surface, scratch, listed, some, MOST_SWEEPS, False)
 
         begin = 1.0 - 0.5**self.n_sweeps
         n_contracted = self._share(task, all_blocks, progress, (begin, 0.5 * (1.0 + begin)))
@@ -262,7 +264,7 @@ class Engine:
         def task(part: slice) -> None:
             kernels.cost.rank(*bundles, start_scratch(0, 0, 0), part.start, part.stop, 1)
 
-        self._crew.share(task, len(self._face_origin), blocks.PART)
+        self._crew.share(task, self._n_rows, blocks.PART)
 
     def sweep_ranked(
         self,
@@ -292,7 +294,9 @@ class Engine:
         int
             Number of contractions.
         """
-        listed = self._listed if divided else self._all_faces()
+        all_blocks, listed = (
+            self._divide() if divided else (blocks.whole(self._n_rows, self._n_spare), IN_ORDER)
+        )
 
         def task(surface: Surface, scratch: Scratch, some: blocks.Blocks) -> int:
             bundles = surface, self._quadrics, self._watch, scratch, self.rules
@@ -300,12 +304,11 @@ class Engine:
             return int(kernels.sweep.sweep_ranked(*bundles, *lists, some, self._colour))
 
         if divided:
-            all_blocks = self._divide()
-            blocks.allot(all_blocks, self._n_spare, self._count_cheaper(all_blocks, thresholds[-1]))
+            n_cheaper = self._count_cheaper(all_blocks, listed, thresholds[-1])
+            blocks.allot(all_blocks, self._n_spare, n_cheaper)
             n_contracted = self._share(task, all_blocks, progress, (done, done))
         else:
-            whole = blocks.whole(len(listed), self._n_spare)
-            n_contracted = task(self._surface, self._scratch, whole)
+            n_contracted = task(self._surface, self._scratch, all_blocks)
             if progress is not None:
                 progress("contract", done)
         self._scratch.point[kernels.state.MAX_COST] = thresholds[-1]
@@ -317,14 +320,14 @@ class Engine:
         self._change_colour()
         return n_contracted
 
-    def _count_cheaper(self, some: blocks.Blocks, threshold: float) -> NDArray[np.int64]:
-        """How many edges of each block cost less than a threshold."""
+    def _count_cheaper(
+        self, some: blocks.Blocks, listed: NDArray[np.int32], threshold: float
+    ) -> NDArray[np.int64]:
+        """About how many edges of each block cost less than a threshold."""
         n_cheaper = np.zeros(len(some), np.int64)
 
         def count(part: slice) -> None:
-            kernels.cost.count_cheaper(
-                self._cost, self._listed, some[part], threshold, n_cheaper[part]
-            )
+            kernels.cost.count_cheaper(self._cost, listed, some[part], threshold, n_cheaper[part])
 
         self._crew.share(count, len(some), blocks.AT_ONCE)
         return n_cheaper
@@ -345,7 +348,7 @@ class Engine:
     def sample_of_costs(self) -> NDArray[np.float32]:
         """Costs of some of the edges that may be contracted, ascending."""
         assert self._cost is not None
-        n_faces = len(self._face_origin)
+        n_faces = self._n_rows
         step = max(1, n_faces // SAMPLE)
         bundles = self._surface, self._quadrics, self.rules, self._cost
         kernels.cost.rank(*bundles, self._scratch, 0, n_faces, step)
@@ -364,28 +367,26 @@ class Engine:
 
     # --- threads ----------------------------------------------------------------------------------
 
-    def _divide(self) -> blocks.Blocks:
+    def _divide(self) -> blocks.Division:
         """Divide the live faces, in the one way and in the other in turn."""
         assert self._cells is not None
-        surface, way = self._surface, self.n_sweeps % 2
-        known, self._division = self._division, None
-        if known is not None and self.n_sweeps == 0:
-            all_blocks = known.blocks
-            self._surface = surface = surface._replace(vertex_block=known.vertex_block)
-        else:
-            all_blocks = blocks.divide(
-                *(self._cells, way, surface.corner_vertex, surface.vertex_block, self._listed),
-                self._crew,
+        surface, division, self._division = self._surface, self._division, None
+        if division is None or self.n_sweeps > 0:
+            if len(self._room) < self._n_rows:
+                self._room = np.empty(self._n_rows, np.int32)
+            division = blocks.divide(
+                *(self._cells, self.n_sweeps % 2, surface.corner_vertex, surface.vertex_block),
+                *(self._room, self._crew),
             )
         on_loops = self._vertices_on_loops()
         kernels.loops.find_loop_homes(
             on_loops, surface.loop, surface.vertex_block, surface.loop_home
         )
-        return all_blocks
+        return division
 
     def _unite(self) -> None:
         """Make one block of all faces again."""
-        surface = self._surface
+        surface, self._division = self._surface, None
         surface.vertex_block[:] = 0
         surface.loop_home[:] = 0
         on_loops = self._vertices_on_loops()
@@ -398,10 +399,6 @@ class Engine:
         self._on_loops = self._on_loops[self._on_loops >= 0]
         return self._on_loops
 
-    def _all_faces(self) -> NDArray[np.int32]:
-        """A list of all faces, for a sweep over the whole surface."""
-        return np.arange(len(self._face_origin), dtype=np.int32)
-
     def _share(
         self,
         task: Callable[[Surface, Scratch, blocks.Blocks], int],
@@ -413,55 +410,28 @@ class Engine:
 
         Returns the number of contractions.
         """
-        state, surface, scratch = kernels.state, self._surface, self._scratch
         assert self._cells is not None
         at_once = max(1, min(self._cells.at_once, len(all_blocks) // LEAST_TASKS))
         ends = all_blocks[at_once - 1 :: at_once, 1].tolist()
         ends = [*ends, int(all_blocks[-1, 1])]
         room = max(end - begin for begin, end in pairwise([0, *ends]))
 
-        def do(part: slice) -> _Done:
-            own, some = self._borrow_desk(room), all_blocks[part]
-            tally, deferred = own.scratch.tally, own.scratch.lists[state.DEFERRED]
-            tally[: state.N_DONE] = tally[state.N_DEFERRED] = 0
-            n_contracted = task(surface._replace(merges=own.merges), own.scratch, some)
-            done = _Done(
-                n_contracted,
-                tally[: state.N_DONE].copy(),
-                own.merges[:n_contracted].copy(),
-                deferred[: tally[state.N_DEFERRED]].copy(),
-            )
-            self._desks.put(own)
-            return done
+        def do(part: slice) -> Done:
+            def contract(surface: Surface, scratch: Scratch) -> int:
+                return task(surface, scratch, all_blocks[part])
+
+            return self._desks.do(contract, self._surface, room)
 
         def tell(name: str, done: float) -> None:
             assert progress is not None
             progress("contract", span[0] + (span[1] - span[0]) * done)
 
         crew = Crew(self.n_threads, None if progress is None else tell)
-        n_contracted = 0
-        for done in crew.share(do, len(all_blocks), at_once):
-            n_before = self.tally("N_SIMPLE") + self.tally("N_NESTED")
-            n_contracted += done.n_contracted
-            surface.merges[n_before : n_before + len(done.merges)] = done.merges
-            scratch.tally[: state.N_DONE] += done.tally
-            room_left = scratch.lists[state.DEFERRED, self.tally("N_DEFERRED") :]
-            deferred = done.deferred[: len(room_left)]  # a later sweep finds the others again
-            room_left[: len(deferred)] = deferred
-            scratch.tally[state.N_DEFERRED] += len(deferred)
+        all_done = crew.share(do, len(all_blocks), at_once)
+        for done in all_done:
+            add_up(done, self._surface, self._scratch)
         self._unite()
-        return n_contracted
-
-    def _borrow_desk(self, n_faces: int) -> _Desk:
-        """A desk with room for so many faces: one that is free, or a new one."""
-        try:
-            desk = self._desks.get_nowait()
-            if len(desk.scratch.face_mark) >= n_faces:
-                return desk
-        except Empty:
-            pass
-        scratch = start_scratch(n_faces, len(self._scratch.mark), 0)
-        return _Desk(scratch, np.empty((n_faces if len(self._surface.merges) else 0, 2)))
+        return sum(done.n_contracted for done in all_done)
 
     def mesh(self) -> Mesh:
         """The live faces, with all vertices under their old numbers."""
@@ -474,6 +444,7 @@ class Engine:
     def do_without_log(self) -> None:
         """Keep no log of the merges, before the run: nobody will ask for `vertex_weights`."""
         self._surface = self._surface._replace(merges=np.empty((0, 2)))
+        self._desks = Desks(len(self._scratch.mark), keep_log=False)
 
     def vertex_weights(self) -> VertexWeights:
         """How the merged vertices are made of those given."""
@@ -488,105 +459,17 @@ class Engine:
     def result(self) -> Result:
         """The live part, renumbered in the order given, and what is left in it. Ends the run."""
         edges, reasons = self._remaining_edges()
-        self._compact(is_last=True)
-        surface = self._surface
-        number, n_used = self._new_numbers()
-        faces, face_map = self._faces_given()
-        vertices = np.empty((n_used, 3))
-
-        def copy(part: slice) -> None:
-            kernels.result.copy_vertices(surface.vertices, number, part.start, part.stop, vertices)
-
-        def renumber(part: slice) -> None:
-            kernels.result.renumber_corners(number, faces[part].reshape(-1))
-
-        self._crew.share(copy, len(number), blocks.PART)
-        self._crew.share(renumber, len(faces), blocks.PART)
-        vertex_map = self._follow_merges(number)
-        shortest, longest = edge_extremes(Mesh(vertices, faces), self._crew)
-        stop = self._stop(reasons, longest)
-        return Result(
-            *(vertices, faces, vertex_map, face_map, number[edges], reasons),
-            *(shortest, stop, self._vertex_errors(number, n_used)),
+        self._compact(linked=False)
+        crew = self._crew
+        mesh, vertex_map, face_map, number = collect(
+            self._surface, self._arranged, self._face_origin, crew
         )
-
-    def _new_numbers(self) -> tuple[NDArray[np.int32], int]:
-        """The new number of each vertex, -1 where it is gone, and how many are left.
-
-        Their order is the one given.
-        """
-        surface, crew, visit = self._surface, self._crew, self._arranged.vertex_place
-        n = len(visit)
-        is_used, number = np.zeros(n, np.uint8), np.empty(n, np.int32)
-
-        def mark(part: slice) -> None:
-            corners = surface.corner_vertex[3 * part.start : 3 * part.stop]
-            kernels.result.mark_vertices(corners, is_used)
-
-        def count(part: slice) -> int:
-            return int(np.count_nonzero(is_used[visit[part]]))
-
-        def number_those(part: slice) -> None:
-            first = begin[part.start // blocks.PART]
-            kernels.result.number_vertices(visit[part], is_used, first, number)
-
-        crew.share(mark, len(self._face_origin), blocks.PART)
-        begin = np.cumsum([0, *crew.share(count, n, blocks.PART)])
-        crew.share(number_those, n, blocks.PART)
-        return number, int(begin[-1])
-
-    def _follow_merges(self, number: NDArray[np.int32]) -> NDArray[np.int32]:
-        """The number of what each vertex given was merged into, -1 where that is gone."""
-        visit, merged_into = self._arranged.vertex_place, self._surface.merged_into
-        vertex_map = np.empty(len(visit), np.int32)
-
-        def follow(part: slice) -> None:
-            kernels.result.follow_merges(merged_into, number, visit[part], vertex_map[part])
-
-        self._crew.share(follow, len(visit), blocks.PART)
-        return vertex_map
-
-    def _faces_given(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """The live faces in the order in which they were given, and their numbers there."""
-        surface, origin, crew = self._surface, self._face_origin, self._crew
-        if self._arranged.is_as_given:
-            return surface.corner_vertex.reshape(-1, 3), origin
-        n, m = len(origin), len(self._arranged.face_origin)
-        place = np.empty(m, np.int32)
-        faces, face_map = np.empty((n, 3), np.int32), np.empty(n, np.int32)
-
-        def clear(part: slice) -> None:
-            place[part] = -1
-
-        def note(part: slice) -> None:
-            kernels.result.note_places(origin, part.start, part.stop, place)
-
-        def count(part: slice) -> int:
-            return int(np.count_nonzero(place[part] >= 0))
-
-        def copy(part: slice) -> None:
-            first = begin[part.start // blocks.PART]
-            kernels.result.copy_in_order(
-                surface.corner_vertex, place[part], part.start, first, faces, face_map
-            )
-
-        crew.share(clear, m, blocks.PART)
-        crew.share(note, n, blocks.PART)
-        begin = np.cumsum([0, *crew.share(count, m, blocks.PART)])
-        crew.share(copy, m, blocks.PART)
-        return faces, face_map
-
-    def _vertex_errors(self, number: NDArray[np.int32], n_used: int) -> NDArray[np.float64]:
-        """The quadric errors of the vertices that are left, as distances."""
-        if self._quadrics is None:
-            return np.empty(0)
-        errors = np.empty(n_used)
-
-        def find(part: slice) -> None:
-            kernels.quadrics.vertex_errors(self._quadrics, number, part.start, part.stop, errors)
-
-        self._crew.share(find, len(number), blocks.PART)
-        return errors
+        errors = np.empty(0)
+        if self._quadrics is not None:
+            errors = vertex_errors(self._quadrics, number, len(mesh.vertices), crew)
+        shortest, longest = edge_extremes(mesh, crew)
+        stop = self._stop(reasons, longest)
+        return Result(*mesh, vertex_map, face_map, number[edges], reasons, shortest, stop, errors)
 
     def _stop(self, reasons: NDArray[np.str_], longest_edge: float) -> str:
         """The criterion that ended the run; "exhausted" when all that is left is forbidden."""
@@ -648,48 +531,21 @@ class Engine:
     def _unblock(self, rules: Rules, *, commit: bool) -> int:
         state = kernels.state
         bundles = self._surface, self._quadrics, self._watch, self._scratch, rules, self._cost
-        whole = blocks.whole(len(self._face_origin), self._n_spare)
+        whole = blocks.whole(self._n_rows, self._n_spare)
         colour = state.STALE_ODD if self._cost is None else self._colour
         return int(kernels.sweep.unblock(*bundles, self._outer, whole, colour, commit))
 
     def compact_when_half(self) -> None:
         """Drop the dead faces when they are more than the live ones."""
-        if 2 * self.n_faces < len(self._face_origin):
+        if 2 * self.n_faces < self._n_rows:
             self._compact()
             self._watch = self._new_watch()
 
-    def _compact(self, *, is_last: bool = False) -> None:
+    def _compact(self, *, linked: bool = True) -> None:
         """Drop the dead faces. The last time corners need not be linked."""
-        surface, crew, m = self._surface, self._crew, len(self._face_origin)
-        counts = crew.share(self._count_live, m, blocks.PART)
-        begin = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        n_live = int(begin[-1])
-        cost = None if self._cost is None else np.empty(kernels.cost.COLUMNS * n_live, np.float32)
-        place, origin = np.empty(m, np.int32), np.empty(n_live, np.int32)
-        live = surface._replace(
-            corner_vertex=np.empty(3 * n_live, np.int32),
-            next_corner=np.empty(3 * n_live, np.int32),
-            face_state=np.empty(n_live, np.uint8),
-            verdict=np.empty(3 * n_live, np.uint8),
+        before, crew = self._surface.corner_vertex, self._crew
+        self._surface, self._cost, self._face_origin, begin = compact(
+            self._surface, self._cost, self._face_origin, crew, linked=linked
         )
-
-        def copy(part: slice) -> None:
-            kernels.result.copy_live_faces(
-                *(surface, self._cost, self._face_origin, part.start, part.stop),
-                *(begin[part.start // blocks.PART], place, live, cost, origin),
-            )
-
-        def link(part: slice) -> None:
-            kernels.result.copy_links(surface, part.start, part.stop, place, live)
-
-        crew.share(copy, m, blocks.PART)
-        if not is_last:
-            crew.share(link, m, blocks.PART)
-            if self._cells is not None:
-                self._cells = blocks.copy_live(self._cells, surface.corner_vertex, begin, crew)
-        self._surface, self._cost, self._face_origin = live, cost, origin
-        self._listed = self._listed[:n_live]
-
-    def _count_live(self, part: slice) -> int:
-        corner_vertex = self._surface.corner_vertex
-        return int(kernels.result.count_live_faces(corner_vertex, part.start, part.stop))
+        if linked and self._cells is not None:
+            self._cells = blocks.copy_live(self._cells, before, begin, crew)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
 from tetsimplify.crew import Crew
+from tetsimplify.memory import cache_lines
 from tetsimplify.mesh import Mesh
 
+IN_ORDER = np.empty(0, np.int32)  # a list of numbers that are all there in order
 PART = 2**17  # vertices or faces in a task for a thread
 GROUP_BITS = 17  # faces are sorted by so many groups of their first vertices, at most
 
@@ -19,13 +21,16 @@ GROUP_BITS = 17  # faces are sorted by so many groups of their first vertices, a
 class Arrangement(NamedTuple):
     """A mesh whose vertices and faces are in an order of their own."""
 
-    mesh: Mesh
+    vertices: NDArray[np.float64]
+    """Shape (n, 3), or (n, 8): a line of a cache for each, which begins with the position."""
+    faces: NDArray[np.int32]
+    """Shape (m, 3)."""
     vertex_origin: NDArray[np.int32]
     """Shape (n,): number of each vertex in the mesh given."""
     vertex_place: NDArray[np.int32]
     """Shape (n,): the inverse."""
     face_origin: NDArray[np.int32]
-    """Shape (m,): number of each face in the mesh given."""
+    """Shape (m,): number of each face in the mesh given; IN_ORDER where it is the same."""
 
     @property
     def is_as_given(self) -> bool:
@@ -33,15 +38,24 @@ class Arrangement(NamedTuple):
         return self.vertex_origin is self.vertex_place
 
 
-def as_given(mesh: Mesh, crew: Crew) -> Arrangement:
-    """The order of the mesh itself; its arrays are copied."""
-    vertices = np.arange(len(mesh.vertices), dtype=np.int32)
-    faces = np.arange(len(mesh.faces), dtype=np.int32)
-    copies = Mesh(_copy(mesh.vertices, crew), _copy(mesh.faces, crew))
-    return Arrangement(copies, vertices, vertices, faces)
+def as_given(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangement:
+    """The order of the mesh itself; its arrays are copied, its vertices to lines of a cache."""
+    n, m = len(mesh.vertices), len(mesh.faces)
+    vertices, faces = _room(n, in_lines), np.empty((m, 3), np.int32)
+
+    def copy_vertices(part: slice) -> None:
+        vertices[part, :3] = mesh.vertices[part]
+
+    def copy_faces(part: slice) -> None:
+        faces[part] = mesh.faces[part]
+
+    crew.share(copy_vertices, n, PART)
+    crew.share(copy_faces, m, PART)
+    numbers = np.arange(n, dtype=np.int32)
+    return Arrangement(vertices, faces, numbers, numbers, IN_ORDER)
 
 
-def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
+def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangement:
     """Vertices along a Z-order curve (Morton 1966), faces by their first vertices.
 
     So a run of faces is a compact piece of the surface, which fits a cache and has few edges in
@@ -51,13 +65,13 @@ def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
     coded = _sorted_along_curve(mesh.vertices, crew)
     vertex_origin, vertex_place = np.empty(n, np.int32), np.empty(n, np.int32)
     face_origin = np.empty(m, np.int32)
-    arranged = Mesh(np.empty((n, 3)), np.empty((m, 3), np.int32))
+    vertices, faces = _room(n, in_lines), np.empty((m, 3), np.int32)
     shift = max(0, n.bit_length() - GROUP_BITS)
 
     def number(part: slice) -> None:
         kernels.order.number_in_order(
             *(coded, mesh.vertices, part.start, part.stop),
-            *(vertex_origin, vertex_place, arranged.vertices),
+            *(vertex_origin, vertex_place, vertices),
         )
 
     def count(part: slice, n_faces: NDArray[np.int32]) -> None:
@@ -66,12 +80,12 @@ def by_locality(mesh: Mesh, crew: Crew) -> Arrangement:
     def sort(part: slice, begin: NDArray[np.int32]) -> None:
         kernels.order.sort_by_group(
             *(mesh.faces, vertex_place, shift, part.start, part.stop),
-            *(begin, face_origin, arranged.faces),
+            *(begin, face_origin, faces),
         )
 
     crew.share(number, n, PART)
     _sort(count, sort, m, 2**GROUP_BITS, crew)
-    return Arrangement(arranged, vertex_origin, vertex_place, face_origin)
+    return Arrangement(vertices, faces, vertex_origin, vertex_place, face_origin)
 
 
 def _sorted_along_curve(vertices: NDArray[np.float64], crew: Crew) -> NDArray[np.int64]:
@@ -128,12 +142,6 @@ def _sort(
     crew.share(lambda part: sort(part, begin[part.start // at_once]), n_items, at_once)
 
 
-def _copy(array: NDArray[Any], crew: Crew) -> NDArray[Any]:
-    """A copy, made in threads."""
-    to = np.empty_like(array)
-
-    def copy(part: slice) -> None:
-        to[part] = array[part]
-
-    crew.share(copy, len(array), PART)
-    return to
+def _room(n_vertices: int, in_lines: bool) -> NDArray[np.float64]:
+    """Room for positions."""
+    return cache_lines(n_vertices) if in_lines else np.empty((n_vertices, 3))

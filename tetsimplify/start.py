@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import mmap
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from tetsimplify import kernels
 from tetsimplify.crew import Crew
 from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
+from tetsimplify.memory import cache_lines, sparse_zeros
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options
 from tetsimplify.topology import TopologyReport, examine, topology
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from tetsimplify.kernels.state import Scratch, Surface
 
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
-CACHE_LINE = 64  # bytes
-LARGE = 2**20  # bytes: arrays for which it pays to ask for small pages
 SAMPLE = 2**12  # faces whose areas tell the unit of the weights
 AT_ONCE = 2**16  # vertices in a task for a thread
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
@@ -46,6 +44,7 @@ def start_surface(
     arranged: Arrangement,
     options: Options,
     locked: NDArray[np.bool_] | NDArray[np.uint8],
+    vertex_block: NDArray[np.int32] | None = None,
     threads: int | None = None,
 ) -> Start:
     """The corner table of a mesh, and its topology.
@@ -54,10 +53,13 @@ def start_surface(
     ----------
     given : Mesh
     arranged : Arrangement
-        The same in another order. Its arrays are used, not copied.
+        The same in another order. Its arrays are used, not copied. With quadrics its vertices are
+        as those of `new_quadrics`.
     options : Options
     locked : ndarray, shape (n,), bool or uint8
         In the order given. 2 where edges may not be contracted either.
+    vertex_block : ndarray, shape (n,), int32, optional
+        Block of each vertex where the surface is divided.
     threads : int, optional
         How many threads to use.
 
@@ -66,9 +68,8 @@ def start_surface(
     MeshError
         When the mesh is no consistently oriented 2-manifold.
     """
-    mesh = arranged.mesh
-    n, m = len(mesh.vertices), len(mesh.faces)
-    corner_vertex = mesh.faces.reshape(-1)
+    vertices, corner_vertex = arranged.vertices, arranged.faces.reshape(-1)
+    n, m = len(vertices), len(arranged.faces)
     report, loop, next_corner, first_corner = examine(corner_vertex, n, threads=threads)
     if not report.is_manifold:
         defects = topology(*given).defects()  # which are told in the order given
@@ -83,18 +84,16 @@ def start_surface(
     if locked.any():
         held[:] = locked[arranged.vertex_origin]
     if options.boundary != "simplify":
-        is_held = _is_held(
-            mesh.vertices, corner_vertex, next_corner, loop, on_loops, options.boundary
-        )
+        is_held = _is_held(vertices, corner_vertex, next_corner, loop, on_loops, options.boundary)
         held[on_loops] = np.maximum(held[on_loops], is_held)
     n_loops = max(1, report.n_boundary_loops)
     surface: Surface = kernels.state.Surface(
-        vertices=mesh.vertices,
+        vertices=vertices,
         corner_vertex=corner_vertex,
         next_corner=next_corner,
         face_state=np.full(m, kernels.state.STALE_ODD, np.uint8),
         verdict=np.zeros(3 * m, np.uint8),
-        vertex_block=np.zeros(n, np.int32),
+        vertex_block=np.zeros(n, np.int32) if vertex_block is None else vertex_block,
         merged_into=np.arange(n, dtype=np.int32),
         loop=loop,
         loop_size=np.zeros(n_loops, np.int32),
@@ -119,6 +118,7 @@ def _is_held(
         return np.ones(len(on_loops), np.bool_)
     before, after = np.arange(len(loop)), np.arange(len(loop))
     kernels.rings.boundary_neighbours(corner_vertex, next_corner, loop, before, after)
+    vertices = vertices[:, :3]
     here = vertices[on_loops]
     come, go = here - vertices[before[on_loops]], vertices[after[on_loops]] - here
     ahead = np.einsum("ij,ij->i", come, go)
@@ -149,11 +149,10 @@ def start_quadrics(
     surface, _, first_corner, on_loops = start
     n = len(surface.vertices)
     limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
-    quadrics = new_quadrics(n)
+    quadrics = new_quadrics(n, surface.vertices)
     unit = _weight_unit(surface)
 
     def sum_faces(part: slice) -> None:
-        quadrics.origin.view(np.float64)[part, :3] = surface.vertices[part]
         largest = limit if bound is None else bound[part]
         quadrics.origin[part, kernels.quadrics.MAX_ERROR2] = largest * np.abs(largest)
         kernels.quadrics.sum_faces(
@@ -178,21 +177,20 @@ def _weight_unit(surface: Surface) -> float:
     return float(2.0 ** round(math.log2(area))) if 0.0 < area < math.inf else 1.0
 
 
-def new_quadrics(n_vertices: int) -> Quadrics:
-    """Quadrics of so many vertices, all zero."""
-    matrix, places = _cache_lines(n_vertices), _cache_lines(n_vertices)
+def new_quadrics(n_vertices: int, vertices: NDArray[np.float64] | None = None) -> Quadrics:
+    """Quadrics of so many vertices, all zero.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 8), float64, optional
+        Lines of a cache that begin with the positions.
+    """
+    matrix = cache_lines(n_vertices)
+    places = cache_lines(n_vertices) if vertices is None else vertices
     quadrics: Quadrics = kernels.quadrics.Quadrics(
         matrix=matrix, linear=matrix.view(np.float32), origin=places.view(np.float32)
     )
     return quadrics
-
-
-def _cache_lines(n: int) -> NDArray[np.float64]:
-    """So many lines of a cache, all zero, shape (n, 8)."""
-    width = CACHE_LINE // 8
-    memory = np.zeros((n + 1) * width)
-    first = -(memory.ctypes.data // 8) % width
-    return memory[first : first + n * width].reshape(n, width)
 
 
 def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
@@ -202,24 +200,12 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     scratch: Scratch = state.Scratch(
         tally=np.zeros(state.TALLY_SIZE, np.int64),
         mark=np.zeros(n_coned, np.int32),
-        face_mark=_sparse_zeros(n_faces),
-        nodes=_sparse_zeros(3, n_nodes),
-        lists=_sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),
-        ring=_sparse_zeros(2, 2 * n_faces + 4),
+        face_mark=sparse_zeros(n_faces),
+        nodes=sparse_zeros(3, n_nodes),
+        lists=sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),
+        ring=sparse_zeros(2, 2 * n_faces + 4),
         point=np.zeros(state.POINT_SIZE),
         lanes=np.zeros(state.N_ROWS * state.WIDTH),
     )
     scratch.tally[state.STAMP_LIMIT] = STAMP_LIMIT
     return scratch
-
-
-def _sparse_zeros(*shape: int) -> NDArray[np.int32]:
-    """Zeros (int32) that take memory only where they are touched, and that in small pages.
-
-    NumPy asks for large pages for large arrays. Of those in which only a few places are touched,
-    far apart, these would take all the memory, and the time to clear it.
-    """
-    size = 4 * math.prod(shape)
-    if size < LARGE:
-        return np.zeros(shape, np.int32)
-    return np.frombuffer(mmap.mmap(-1, size), np.int32).reshape(shape)

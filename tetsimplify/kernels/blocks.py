@@ -24,7 +24,7 @@ def count_live(corner_vertex, cells, first, last, n_faces):
 
 
 @kernel_in_place
-def put_in_blocks(n_faces, least, block_of, place, begin):
+def put_in_blocks(n_faces, least, block_of, first_cell):
     """Put neighbouring cells together to blocks of at least so many faces, but for the last.
 
     Parameters
@@ -34,42 +34,65 @@ def put_in_blocks(n_faces, least, block_of, place, begin):
     least : int, int
         Faces in the first block and in each of the others.
     block_of : int32 (n_cells,), out
-    place : int32 (n_parts, n_cells), out
-        Where each part lists its faces of each block, in the column of the number of the block.
-    begin : int32 (n_cells + 1,), out
-        Where the faces of each block begin in the list.
+    first_cell : int32 (n_cells + 1,), out
+        Of each block, and after the last one the number of cells.
 
     Returns
     -------
     int
         Number of blocks.
     """
-    n_blocks, n_listed, first, filled = 0, 0, 0, 0
+    n_blocks, filled = 0, 0
+    first_cell[0] = 0
     for c in range(block_of.size):
         block_of[c] = n_blocks
         for p in range(len(n_faces)):
             filled += n_faces[p, c]
-        if filled < least[min(n_blocks, 1)] and c + 1 < block_of.size:
-            continue
-        begin[n_blocks] = n_listed
-        for p in range(len(n_faces)):
-            place[p, n_blocks] = n_listed
-            for d in range(first, c + 1):
-                n_listed += n_faces[p, d]
-        n_blocks += 1
-        first, filled = c + 1, 0
-    begin[n_blocks] = n_listed
+        if filled >= least[min(n_blocks, 1)] or c + 1 == block_of.size:
+            n_blocks, filled = n_blocks + 1, 0
+            first_cell[n_blocks] = c + 1
     return n_blocks
 
 
 @kernel_in_place
-def list_faces(corner_vertex, cells, block_of, first, last, place, vertex_block, listed):
-    """List live faces block by block, and note a block of each vertex: any of those it is in."""
+def place_in_list(n_faces, first_cell, place, begin):
+    """Tell where each part lists its faces of each block, and where the blocks begin.
+
+    Parameters
+    ----------
+    n_faces : int32 (n_parts, n_cells)
+    first_cell : int32 (n_blocks + 1,)
+        As of :func:`put_in_blocks`.
+    place : int32 (n_parts, n_cells), out
+        In the column of the number of the block.
+    begin : int64 (n_blocks + 1,), out
+    """
+    n = 0
+    for block in range(begin.size - 1):
+        begin[block] = n
+        for p in range(len(n_faces)):
+            place[p, block] = n
+            for c in range(first_cell[block], first_cell[block + 1]):
+                n += n_faces[p, c]
+    begin[begin.size - 1] = n
+
+
+@kernel_in_place
+def list_faces(corner_vertex, cells, block_of, first, last, place, listed):
+    """List live faces block by block."""
     for f in range(first, last):
         if corner_vertex[3 * f] != DEAD:
             block = block_of[_cell_of(cells, f)]
             listed[place[block]] = f
             place[block] += 1
+
+
+@kernel_in_place
+def note_blocks(corner_vertex, cells, block_of, first, last, vertex_block):
+    """Note a block of each vertex: any of those that it is in."""
+    for f in range(first, last):
+        if corner_vertex[3 * f] != DEAD:
+            block = block_of[_cell_of(cells, f)]
             for corner in range(3 * f, 3 * f + 3):
                 vertex_block[corner_vertex[corner]] = block
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.lists import item
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.quadrics import (
@@ -254,8 +255,10 @@ def count_cheaper(cost, listed, blocks, threshold, n_cheaper):
         step = max(1, (last - first) // COUNTED)
         n = 0
         for i in range(first, last, step):
-            x, y, z = costs_of(cost, listed[i])
-            n += np.int64(x < threshold) + np.int64(y < threshold) + np.int64(z < threshold)
+            f = item(listed, i)
+            x, y, z = costs_of(cost, f)
+            n_below = np.int64(x < threshold) + np.int64(y < threshold) + np.int64(z < threshold)
+            n += n_below if least_cost(cost, f) < np.inf else 0
         n_cheaper[b] = n * step
 
 

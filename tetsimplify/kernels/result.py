@@ -6,6 +6,7 @@ from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.cost import COLUMNS
 from tetsimplify.kernels.geometry import squared_length
 from tetsimplify.kernels.jit import kernel_in_place
+from tetsimplify.kernels.lists import item
 
 
 @kernel_in_place
@@ -27,7 +28,7 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
     cost : float32 (4 m,) or None
         Where costs are kept.
     origin : int32 (m,)
-        Number of each face in the mesh given.
+        Number of each face in the mesh given; see lists.py.
     begin : int
         How many live faces come before.
     place : int32 (m,), out
@@ -50,7 +51,7 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
             for k in range(COLUMNS):
                 to_cost[COLUMNS * n + k] = cost[COLUMNS * f + k]
         to.face_state[n] = surface.face_state[f]
-        to_origin[n] = origin[f]
+        to_origin[n] = item(origin, f)
         n += 1
 
 

@@ -21,6 +21,7 @@ from tetsimplify.kernels.cost import (
     without,
 )
 from tetsimplify.kernels.jit import inlined, kernel_in_place, part
+from tetsimplify.kernels.lists import item
 from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.state import (
     AT_ONCE,
@@ -98,7 +99,7 @@ def sweep(surface, quadrics, watch, scratch, rules, listed, blocks, n_sweeps, co
     Parameters
     ----------
     listed : int32
-        Faces, in the order in which they are looked at.
+        Faces, in the order in which they are looked at; see lists.py.
     blocks : int64 (k, 4)
         See :mod:`tetsimplify.blocks`.
     n_sweeps : int
@@ -146,7 +147,7 @@ def _sweep_run(surface, quadrics, watch, scratch, rules, listed, first, last, co
     """Sweep once over at most AT_ONCE faces."""
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
-        f = listed[i]
+        f = item(listed, i)
         state = surface.face_state[f]
         waiting[n_waiting] = f
         n_waiting += (state != SETTLED) & (state != colour) & ((state != BLOCKED) | retry)
@@ -207,7 +208,7 @@ def sweep_ranked(
     lenience : float
         So many times the threshold an edge may cost together with the factor for the shapes.
     listed : int32
-        Faces, in the order in which they are looked at.
+        Faces, in the order in which they are looked at; see lists.py.
     blocks : int64 (k, 4)
         See :mod:`tetsimplify.blocks`.
     colour : int
@@ -257,8 +258,9 @@ def _sweep_run_ranked(
     max_cost = scratch.point[MAX_COST]
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
-        waiting[n_waiting] = listed[i]
-        n_waiting += least_cost(cost, listed[i]) < max_cost
+        f = item(listed, i)
+        waiting[n_waiting] = f
+        n_waiting += least_cost(cost, f) < max_cost
     rank_faces(surface, quadrics, rules, cost, scratch, n_waiting, colour)
     n_contracted = 0
     for i in range(n_waiting):
