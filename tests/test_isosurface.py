@@ -306,7 +306,7 @@ def test_only_a_few_planes_are_read_at_once():
             self.largest = max(self.largest, read.size)
             return read
 
-    values = np.zeros((200, 100, 600), np.uint8)
+    values = np.zeros((300, 100, 600), np.uint8)
     values[50:120, 20:70, 100:500] = 1
     volume = OnDisk(values)
     mesh = extract_isosurface(volume, 0.5)

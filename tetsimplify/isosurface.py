@@ -220,7 +220,7 @@ def extract_isosurface(
         if factor > 1:
             samples, frame[0] = Refined(samples, factor), frame[0] / factor
             fields = {name: Refined(field, factor, name) for name, field in fields.items()}
-        planes, tables = Planes(samples), lattice_tables(lattice, closed)
+        planes, tables = Planes(samples, is_compact=True), lattice_tables(lattice, closed)
         data = VertexData(fields, vertex_normals, workers)
         is_traced = data.is_wanted or regularise
         marches = [March(planes, one, above, frame, tables, workers, is_traced) for one in levels]

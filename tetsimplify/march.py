@@ -22,7 +22,7 @@ from tetsimplify.planes import Planes
 from tetsimplify.tables import Tables
 from tetsimplify.workers import Workers
 
-BYTES_AT_ONCE = 2**24  # of float64 samples
+BYTES_AT_ONCE = 2**24  # of samples
 BYTES_IN_PLACE = 2**32  # the same where nothing is copied, so that the result can be made at once
 LEAST_PLANES_AT_ONCE = 4
 LEAST_SAMPLES_OF_SLAB = 2**15  # below that a thread takes longer to wake up than to work
@@ -52,8 +52,8 @@ class Block(NamedTuple):
     """The first plane of the samples, which is `begin` or the one before."""
     n_planes: int
     """Planes of the volume."""
-    samples: NDArray[np.float64]
-    """Of planes from `first` to some planes beyond `end`."""
+    samples: NDArray[Any]
+    """Float64 or float32, of planes from `first` to some planes beyond `end`."""
     centres: NDArray[np.float64]
     """Values given for the centres of the cubes above these planes, none for their means."""
 
@@ -75,7 +75,7 @@ def blocks(
     n_more = 3 if tables.has_centres else 2
     if ends is None:
         n_bytes = BYTES_IN_PLACE if volume.is_in_place else BYTES_AT_ONCE
-        at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (8 * n1 * n2))
+        at_once = max(LEAST_PLANES_AT_ONCE, n_bytes // (volume.dtype.itemsize * n1 * n2))
         at_once -= at_once % volume.planes_of_chunk if volume.planes_of_chunk < at_once else 0
         ends = [*range(at_once - n_more, n_planes - n_more, at_once), n_planes]
     for begin, end in pairwise([0, *ends]):

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from tetsimplify.errors import VolumeError
 from tetsimplify.workers import Workers
 
+SPARE_PLANES = 4  # room for those around the second block, of which the first has less
+
 
 def as_sliceable(volume: Any) -> Any:
     """Anything with ``shape``, ``dtype`` and slices as it is, other things as arrays."""
@@ -18,25 +20,30 @@ def as_sliceable(volume: Any) -> Any:
 
 
 class Planes:
-    """The planes of a volume that are at work, as float64.
+    """The planes of a volume that are at work, as float64 or float32.
 
     Parameters
     ----------
     volume : array_like, shape (n0, n1, n2)
         Anything with ``shape``, ``dtype`` and slices along the first axis: it is asked for
         ``volume[begin:end]`` and nothing else, in order and without overlap. Samples of an array
-        of float64 in memory are used where they are.
+        in memory that are of the right type are used where they are.
     name : str
         What the volume is called in messages.
+    is_compact : bool
+        Hold float32 where no sample needs rounding for that, which goes by the type of the volume:
+        half the memory, and half of what is fetched from it.
     """
 
-    def __init__(self, volume: Any, name: str = "volume") -> None:
+    def __init__(self, volume: Any, name: str = "volume", is_compact: bool = False) -> None:
         self.name = name
         self.shape: tuple[int, int, int] = tuple(volume.shape)
         self._volume = volume
+        fits = is_compact and np.can_cast(np.dtype(volume.dtype), np.float32)
+        self.dtype = np.dtype(np.float32 if fits else np.float64)
         self.is_in_place = (
             isinstance(volume, np.ndarray)
-            and volume.dtype == np.float64
+            and volume.dtype == self.dtype
             and volume.dtype.isnative
             and volume.flags.c_contiguous
             and volume.flags.aligned
@@ -44,10 +51,10 @@ class Planes:
         chunks = getattr(volume, "chunks", None) or (1,)
         self.planes_of_chunk = chunks[0] if isinstance(chunks[0], int) else 1
         """How many planes are stored together, as arrays of HDF5 and Zarr tell."""
-        self._buffer = np.empty((0, *self.shape[1:]))
+        self._buffer = np.empty((0, *self.shape[1:]), self.dtype)
         self._begin = self._end = 0
 
-    def take(self, begin: int, end: int, workers: Workers) -> NDArray[np.float64]:
+    def take(self, begin: int, end: int, workers: Workers) -> NDArray[Any]:
         """Planes from `begin` to `end`, neither before those of the last time.
 
         What was returned the last time is overwritten.
@@ -56,7 +63,7 @@ class Planes:
             return self._volume[begin:end]
         kept = self._buffer[begin - self._begin : self._end - self._begin]
         if len(self._buffer) < end - begin:
-            larger = np.empty((end - begin, *self.shape[1:]))
+            larger = np.empty((end - begin + SPARE_PLANES, *self.shape[1:]), self.dtype)
             larger[: len(kept)] = kept
             self._buffer = larger
         else:
@@ -67,7 +74,7 @@ class Planes:
         self._begin, self._end = begin, end
         return self._buffer[: end - begin]
 
-    def _read(self, begin: int, target: NDArray[np.float64], workers: Workers) -> None:
+    def _read(self, begin: int, target: NDArray[Any], workers: Workers) -> None:
         source = np.asarray(self._volume[begin : begin + len(target)])
         if source.shape != target.shape:
             raise VolumeError(
@@ -82,7 +89,7 @@ class Planes:
 
         workers.map(cast, workers.parts(0, len(target)))
 
-    def refuse(self, planes: NDArray[np.float64], begin: int) -> None:
+    def refuse(self, planes: NDArray[Any], begin: int) -> None:
         """Raise for the first sample that is not finite.
 
         Raises

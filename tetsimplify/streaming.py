@@ -154,7 +154,7 @@ def extract_and_simplify(
         with Workers(threads) as workers:
             (number,) = as_levels(level, samples)
             march = March(
-                *(Planes(by_chunks(samples)), number, normals == "lower", frame),
+                *(Planes(by_chunks(samples), is_compact=True), number, normals == "lower", frame),
                 *(lattice_tables(lattice, closed), workers),
             )
             stream = _Stream(options, workers, progress)

@@ -24,6 +24,7 @@ import numpy as np
 
 from tetsimplify.kernels.bits import lowest_bit, n_bits
 from tetsimplify.kernels.jit import cold_part, kernel_in_place, part
+from tetsimplify.kernels.prefetch import prefetch_row
 
 # How near to a lattice point a vertex may come, as a part of the lattice edge: where a sample
 # equals the level, edges keep a length and faces an area.
@@ -37,7 +38,7 @@ class Window(NamedTuple):
     """Some planes of a volume, and which of its points are inside."""
 
     samples: np.ndarray
-    """(p, n1, n2) float64."""
+    """(p, n1, n2) float64 or float32."""
     inside: np.ndarray
     """(p, n1, n_words) uint32: of the samples."""
     centres: np.ndarray
@@ -78,7 +79,7 @@ def colour_samples(samples, level, above, row, inside):
 
     Parameters
     ----------
-    samples : float64 (p, n1, n2)
+    samples : float64 or float32 (p, n1, n2)
     row : uint8 (n2,)
         Scratch space.
     inside : uint32 (p, n1, n_words), out
@@ -317,8 +318,10 @@ def fill_slab(window, tables, z0, z1, start, frame, numbers, active, out):
         z = plane - window.first
         for y in range(n1):
             row_place = _place_of_row(window, z, y)
+            later = window.samples[min(z + 2, len(window.samples) - 1), y]
             for i in range(_active_sites(window, tables, z, y, active)):
                 x, colour = np.int64(active[0, i]), active[1, i]
+                prefetch_row(later, x)  # where the surface goes on, most likely
                 place = _place_in_row(row_place, x, n2)
                 slots = np.int64(tables.crossing[colour] & tables.exists[place])
                 if slots == 0:

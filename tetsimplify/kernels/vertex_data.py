@@ -37,7 +37,7 @@ def gradient_normals(samples, first, n_planes, tables, edges, ratios, frame, dow
 
     Parameters
     ----------
-    samples : float64 (p, n1, n2)
+    samples : float64 or float32 (p, n1, n2)
         Planes of the volume, one before that of the first vertex where there is one.
     n_planes : int
         Planes of the volume.
