@@ -40,7 +40,7 @@ class Clock:
 
 def contract(
     engine: Engine,
-    mesh: Mesh,
+    mesh: Mesh | None,
     *,
     locked: NDArray[np.bool_],
     vertex_data: Data,
@@ -48,10 +48,15 @@ def contract(
     progress: Progress | None,
     clock: Clock,
 ) -> Simplification:
-    """Contract edges of a mesh that an engine is made of; see :func:`tetsimplify.simplify`."""
+    """Contract edges of a mesh that an engine is made of; see :func:`tetsimplify.simplify`.
+
+    Without the mesh, which need not be kept, nothing is told of its shortest edge.
+    """
     options = engine.options
-    with clock.stage("check"):
-        shortest_before, _ = edge_extremes(mesh, Crew(engine.n_threads))
+    shortest_before = np.inf
+    if mesh is not None:
+        with clock.stage("check"):
+            shortest_before, _ = edge_extremes(mesh, Crew(engine.n_threads))
 
     with clock.stage("contract"):
         n_rounds = 1
@@ -60,6 +65,7 @@ def contract(
                 engine.do_without_log()
             run(engine, progress)
         else:
+            assert mesh is not None
             engine, n_rounds = run_within(mesh, options, locked, engine.n_threads, progress)
 
     with clock.stage("report"):

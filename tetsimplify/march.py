@@ -145,7 +145,6 @@ class March:
         n_above = 0 if is_last else self._count(window, (block.end, block.end + 1))[0]
         self._add(block, window, lambda done: None, n_above)
         raw = Raw(self.vertices.finish(), self.faces.finish(), self._n_shared, n_above)
-        self.vertices, self.faces = Rows(np.float64, 3), Rows(np.int32, 3)
         self._n_shared = n_above
         return raw
 
@@ -300,9 +299,11 @@ class Rows:
         self.n_rows = n_rows
 
     def finish(self) -> NDArray[Any]:
-        """Exactly the rows added."""
+        """Hand over exactly the rows added, and begin anew."""
         self._resize(self.n_rows)
-        return self._rows
+        rows = self._rows
+        self._rows, self.n_rows = np.empty((0, *rows.shape[1:]), rows.dtype), 0
+        return rows
 
     def _resize(self, n_rows: int) -> None:
         if not len(self._rows):  # growing fills with zeros, which takes time

@@ -86,7 +86,7 @@ class Finished:
         return self._vertices.n_rows
 
     def mesh(self) -> Mesh:
-        """All of it. Nothing can be added afterwards."""
+        """Hand over all of it."""
         return Mesh(self._vertices.finish(), self._faces.finish())
 
 
