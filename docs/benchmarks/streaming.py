@@ -52,7 +52,8 @@ def opened(path: str) -> Any:
 def one_run(path: str, level: float, length: float, way: str, threads: int) -> None:
     """Measure in this process, which does nothing else, and print what was found as JSON."""
     volume = opened(path)
-    simplified(way, gyroid_volume(24), 0.0, 1.5, threads)  # compiles
+    like = (gyroid_volume(24) > 0.0).astype(volume.dtype)
+    simplified(way, like, 0.5, 1.5, threads)  # compiles for the type of the volume
     before = memory("VmRSS")
     Path("/proc/self/clear_refs").write_text("5")  # the high-water mark starts anew
     begin = time.perf_counter()
