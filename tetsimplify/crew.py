@@ -74,7 +74,7 @@ class Crew:
             try:
                 while not failures and (i := next(next_part)) < len(parts):
                     results[i] = task(parts[i])
-                    if tell is not None:
+                    if tell is not None and len(results) < len(parts):
                         tell(self._n_done + len(results) / len(parts))
             except BaseException as failure:  # what was raised by `progress` above all
                 failures.append(failure)
