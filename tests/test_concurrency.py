@@ -73,7 +73,7 @@ def test_one_thread_starts_no_others(monkeypatch):
         raise AssertionError("a thread was started")
 
     mesh = meshes.icosphere(3)
-    monkeypatch.setattr("tetsimplify.crew.Thread", refuse)
+    monkeypatch.setattr("tetsimplify.workers.ThreadPoolExecutor", refuse)
     monkeypatch.setattr("tetsimplify.distance.AT_ONCE", 50)
     tetsimplify.surface_distance(mesh, mesh, threads=1)
     tetsimplify.simplify(*mesh, max_error=0.1, threads=1)

@@ -35,6 +35,7 @@ SHIFT = 1.0 / 3.0  # of the extent, by which the cells of the second way are shi
 
 Blocks = NDArray[np.int64]
 SPARE = 2  # the column
+FEW_DEAD = 0.9  # of the faces are live: then no list is made of these
 
 
 class Cells(NamedTuple):
@@ -57,7 +58,8 @@ class Division(NamedTuple):
 
     blocks: Blocks
     listed: NDArray[np.int32]
-    """The live faces block by block; IN_ORDER where these are runs of faces as they are."""
+    """The live faces block by block; IN_ORDER where these are runs of faces as they are, with a few
+    dead ones among them."""
 
 
 def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
@@ -153,8 +155,8 @@ def divide(
     crew : Crew
     """
     of_faces, m = (cells.of_faces[way], CELL_BITS), len(corner_vertex) // 3
-    in_order = not len(of_faces[0])
-    n_cells = (m >> CELL_BITS) + 1 if in_order else cells.n_curve
+    are_runs = not len(of_faces[0])
+    n_cells = (m >> CELL_BITS) + 1 if are_runs else cells.n_curve
     n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
     block_of, first_cell = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
 
@@ -185,6 +187,7 @@ def divide(
     first_cell = first_cell[: n_blocks + 1]
     crew.share(note, m, PART)
     crew.share(find_shared, m, PART)
+    in_order = are_runs and n_faces.sum() > FEW_DEAD * m
     if in_order:
         begin = np.minimum(first_cell.astype(np.int64) << CELL_BITS, m)
     else:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import count
-from threading import Thread
 from typing import TypeVar
 
-from tetsimplify.errors import OptionError
 from tetsimplify.options import Progress
+from tetsimplify.workers import Workers
 
 Result = TypeVar("Result")
-Other = TypeVar("Other")
 
 
 class Crew:
@@ -49,12 +44,8 @@ class Crew:
         name: str = "",
         n_tasks: int = 1,
     ) -> None:
-        if threads is None:
-            can_tell = hasattr(os, "sched_getaffinity")
-            threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-            raise OptionError(f"threads must be a positive integer, got {threads!r}")
-        self.n_threads = threads
+        self._workers = Workers(threads)
+        self.n_threads = self._workers.n_threads
         self._progress = progress
         self._name = name
         self._n_tasks = n_tasks
@@ -66,42 +57,12 @@ class Crew:
         The thread that asks for it does its share, so that no processor waits for a new thread.
         """
         parts = [slice(k, min(k + at_once, n_items)) for k in range(0, n_items, at_once)]
-        results: dict[int, Result] = {}
-        failures: list[BaseException] = []
-        next_part = count()
-
-        def work(tell: Callable[[float], None] | None = None) -> None:
-            try:
-                while not failures and (i := next(next_part)) < len(parts):
-                    results[i] = task(parts[i])
-                    if tell is not None and len(results) < len(parts):
-                        tell(self._n_done + len(results) / len(parts))
-            except BaseException as failure:  # what was raised by `progress` above all
-                failures.append(failure)
-
-        helpers = [Thread(target=work) for _ in range(min(self.n_threads, len(parts)) - 1)]
-        for helper in helpers:
-            helper.start()
-        work(self._tell)
-        for helper in helpers:
-            helper.join()
-        if failures:
-            raise failures[0]
-        if parts:
-            self._tell(self._n_done + 1)
+        results: list[Result] = []
+        for result in self._workers.each(task, parts):
+            results.append(result)
+            self._tell(self._n_done + len(results) / len(parts))
         self._n_done += 1
-        return [results[i] for i in range(len(parts))]
-
-    def do_both(
-        self, one: Callable[[], Result], other: Callable[[], Other]
-    ) -> tuple[Result, Other]:
-        """Do two different things, at the same time where there are threads for it."""
-        if self.n_threads < 2:
-            return one(), other()
-        with ThreadPoolExecutor(1) as pool:
-            waiting = pool.submit(other)
-            done = one()
-            return done, waiting.result()
+        return results
 
     def _tell(self, n_done: float) -> None:
         if self._progress is not None:

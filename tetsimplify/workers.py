@@ -1,14 +1,15 @@
-"""Threads that stay, for many small passes over the same data."""
+"""Threads that share many small passes over the same data."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from itertools import pairwise
 from types import TracebackType
 from typing import TypeVar
 
-from tetsimplify.crew import Crew
+from tetsimplify.errors import OptionError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -18,7 +19,7 @@ LARGEST_PART = 32
 
 
 class Workers:
-    """Threads that share passes; a context manager.
+    """Threads that share passes. They stay until this is gone, or the end of a ``with`` block.
 
     Parameters
     ----------
@@ -37,7 +38,12 @@ class Workers:
     """
 
     def __init__(self, threads: int | None) -> None:
-        self.n_threads = Crew(threads).n_threads
+        if threads is None:
+            can_tell = hasattr(os, "sched_getaffinity")
+            threads = len(os.sched_getaffinity(0)) if can_tell else os.cpu_count() or 1
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise OptionError(f"threads must be a positive integer, got {threads!r}")
+        self.n_threads = threads
         self._pool: ThreadPoolExecutor | None = None
 
     def __enter__(self) -> Workers:
@@ -61,7 +67,7 @@ class Workers:
 
         The thread of the caller does its share.
         """
-        if self.n_threads == 1 or len(items) == 1:
+        if self.n_threads == 1 or len(items) < 2:
             yield from map(task, items)
             return
         results: dict[int, Result] = {}
@@ -71,7 +77,8 @@ class Workers:
             for i in numbers:
                 results[i] = task(items[i])
 
-        helpers = [self._started().submit(take_some) for _ in range(self.n_threads - 1)]
+        n_helpers = min(self.n_threads, len(items)) - 1
+        helpers = [self._started().submit(take_some) for _ in range(n_helpers)]
         try:
             for k in range(len(items)):
                 while k not in results and (i := next(numbers, -1)) >= 0:
