@@ -149,6 +149,16 @@ def test_shuffled_meshes_are_put_in_order(small_blocks):
     assert_maps_fit(*mesh, tetsimplify.simplify(*mesh, max_edge_length=0.3))
 
 
+@pytest.mark.parametrize("size", [1e-310, 1e-300, 1e300, 1.7e308])
+@pytest.mark.parametrize("mode", MODES_OF_DIVISION, ids=lambda mode: next(iter(mode)))
+def test_the_curve_stays_in_its_cells_whatever_the_size(small_blocks, mode, size):
+    vertices, faces = meshes.icosphere(3)
+    options = {name: value * (size if "length" in name else 1) for name, value in mode.items()}
+    with np.errstate(over="ignore"):
+        result = tetsimplify.simplify(vertices * size, faces[::-1], **options)
+    assert_same_topology(faces, result)
+
+
 # --- the promises ---------------------------------------------------------------------------------
 
 

@@ -165,12 +165,12 @@ class Options:
             in_edges = 0.0 if has_length else DEFAULT_REMOVAL_LIMIT
         placement = PLACEMENTS[self.chosen_placement]
         return kernels.state.Rules(
-            max_length2=length**2,
+            max_length2=length * length,  # infinite, not an error, where it overflows
             by_length=self.by_length,
             is_bounded=self.max_quadric_error is not None,
             blocked=BLOCKED.index(self.blocked),
-            removal_limit2=float(limit) ** 2,
-            removal_edges2=in_edges**2,
+            removal_limit2=float(limit) * float(limit),
+            removal_edges2=in_edges * in_edges,
             cos_foldover=_cosine(self.foldover),
             cos_deviation=_cosine(self.guard("normal_deviation")),
             shape=float(self.guard("shape") or 0.0),

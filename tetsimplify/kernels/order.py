@@ -22,7 +22,8 @@ def _morton(vertices, v, low, scale, most):
     """Place of a vertex on a Z-order curve (Morton 1966) through cells of a size 1 / scale."""
     code = 0
     for axis in range(3):
-        cell = min(np.int64((vertices[v, axis] - low[axis]) * scale), most)
+        cell = np.int64((vertices[v, axis] - low[axis]) * scale)
+        cell = min(max(cell, 0), most)  # of what overflows, too
         code |= _spread(cell) << axis
     return code
 
