@@ -204,7 +204,7 @@ def test_errors_of_the_result_are_those_of_the_planes_merged():
         assert engine.tally("N_NESTED") == 0
         expected = naive_quadrics.rms_errors(vertices, faces, engine.result)
         assert expected.max() > 0.01
-        assert np.allclose(engine.result.vertex_errors, expected, rtol=1e-4, atol=1e-6)
+        assert np.allclose(engine.vertex_errors(), expected, rtol=1e-4, atol=1e-6)
 
 
 # --- topology, in every mode ----------------------------------------------------------------------

@@ -48,9 +48,6 @@ class Result(NamedTuple):
     remaining_reasons: NDArray[np.str_]
     shortest_edge: float
     stop: str
-    vertex_errors: NDArray[np.float64]
-    """Shape (n,): root mean squared distance of each vertex from the planes of the faces that were
-    merged into it; empty without quadrics."""
 
 
 class _Order(NamedTuple):
@@ -464,12 +461,20 @@ class Engine:
         mesh, vertex_map, face_map, number = collect(
             self._surface, self._arranged, self._face_origin, crew
         )
-        errors = np.empty(0)
-        if self._quadrics is not None:
-            errors = vertex_errors(self._quadrics, number, len(mesh.vertices), crew)
+        self._number = number
         shortest, longest = edge_extremes(mesh, crew)
         stop = self._stop(reasons, longest)
-        return Result(*mesh, vertex_map, face_map, number[edges], reasons, shortest, stop, errors)
+        return Result(*mesh, vertex_map, face_map, number[edges], reasons, shortest, stop)
+
+    def vertex_errors(self) -> NDArray[np.float64]:
+        """Root mean squared distances of the vertices of the result from the planes merged there.
+
+        Shape (n,); empty without quadrics.
+        """
+        n_used = len(self.result.vertices)
+        if self._quadrics is None:
+            return np.empty(0)
+        return vertex_errors(self._quadrics, self._number, n_used, self._crew)
 
     def _stop(self, reasons: NDArray[np.str_], longest_edge: float) -> str:
         """The criterion that ended the run; "exhausted" when all that is left is forbidden."""

@@ -21,7 +21,8 @@ SHARES = (0.2, 0.1, 0.02)  # of the edges are below the next threshold: far from
 FAR, NEAR = 4.0, 2.0  # times the faces asked for are left
 LENIENCE = 2.0  # far from the end: triangles that become worse have time to become better again
 SUCCESS, LEAST_SUCCESS = 0.5, 0.2  # part of the edges below a threshold that can be contracted
-N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again
+N_SWEEPS = 6  # with a threshold each, before costs are compared over the whole surface again;
+N_DIVIDED = 9  # the same where that takes more time, as the surface is divided anew
 
 
 class Round(NamedTuple):
@@ -80,7 +81,8 @@ def _run_by_cost(engine: Engine, progress: Progress | None) -> None:
             engine.forget_refusals()
             retry = True
         engine.compact_when_half()
-    engine.rank()
+    if not engine.has_enough or engine.options.max_edge_length is not None:
+        engine.rank()  # what is left will be told
 
 
 def is_far_from_end(engine: Engine) -> bool:
@@ -117,7 +119,8 @@ def next_thresholds(engine: Engine, least: float, n_barren: int = 0, success: fl
     share = SHARES[0 if is_far_from_end(engine) else 2 if is_near_end(engine) else 1]
     n_edges = 1.5 * n_faces
     most = 0.5 * (n_faces - min_faces) / (success * n_edges) if min_faces else 1.0
-    shares = 1.0 - (1.0 - share) ** np.arange(1, N_SWEEPS + 1)
+    n_sweeps = N_DIVIDED if engine.is_divided else N_SWEEPS
+    shares = 1.0 - (1.0 - share) ** np.arange(1, n_sweeps + 1)
     shares = np.unique(np.minimum(shares, most))
     shares = np.maximum(shares, 1.0 / max(1, len(costs))) * 2.0**n_barren
     if not len(costs) or shares[0] > 1.0:

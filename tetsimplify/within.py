@@ -70,7 +70,7 @@ def run_within(
         reported = _too_far(given, before, engine.result, limit, threads)
         if not len(reported.vertices):
             return engine, n_rounds
-        _reduce(bound, engine.result, reported, limit, is_last=n_rounds >= PATIENCE)
+        _reduce(bound, engine, reported, limit, is_last=n_rounds >= PATIENCE)
 
 
 class _Reported(NamedTuple):
@@ -101,12 +101,13 @@ def _too_far(
 
 
 def _reduce(
-    bound: NDArray[np.float64], result: Result, reported: _Reported, limit: float, *, is_last: bool
+    bound: NDArray[np.float64], engine: Engine, reported: _Reported, limit: float, *, is_last: bool
 ) -> None:
     """Reduce the bounds of the vertices reported, below the errors that they came to."""
     if is_last:
         bound[reported.vertices] = LAST_BOUND
         return
-    errors = np.append(result.vertex_errors, np.inf)[result.vertex_map[reported.vertices]]
+    vertex_map = engine.result.vertex_map[reported.vertices]
+    errors = np.append(engine.vertex_errors(), np.inf)[vertex_map]
     part = np.clip(limit / np.maximum(reported.distances, limit), *STEPS)
     bound[reported.vertices] = part * np.minimum(bound[reported.vertices], errors)
