@@ -113,6 +113,9 @@ def simplify_current_mesh(ms: pymeshlab.MeshSet, **parameters: Any) -> dict[str,
         Largest change of a face normal in one contraction, in degrees; 180 is no limit.
     intersections : str
         See :func:`tetsimplify.simplify`.
+    fit : bool
+        Whether vertices are moved nearer to the surface given in the end; see
+        :func:`tetsimplify.simplify`.
     customattributes : bool
         Interpolate the custom attributes of vertices too. Only for those that were made when the
         mesh was in the set: PyMeshLab dies of others.
@@ -301,6 +304,7 @@ FILTERS = {
             "outer": Parameter(str, "region", "outer", choices=OUTER),
             "foldover": Parameter(float, DEFAULT_FOLDOVER, "foldover", _unless(180)),
             "intersections": Parameter(str, "allow", "intersections", choices=INTERSECTIONS),
+            "fit": Parameter(bool, None, "fit", note="as fit='auto' of tetsimplify.simplify"),
             "customattributes": Parameter(bool, False, "expressions"),
         },
     ),

@@ -583,11 +583,17 @@ def test_data_are_carried():
 
 
 def test_progress_rises_to_the_end_and_can_cancel():
-    calls = []
+    calls = {}
     mesh = torus()
-    tetsimplify.simplify(*mesh, keep_ratio=0.05, progress=lambda _, done: calls.append(done))
-    assert calls == sorted(calls)
-    assert len(calls) > 5 and calls[-1] == 1.0
+    tetsimplify.simplify(
+        *mesh,
+        keep_ratio=0.05,
+        progress=lambda stage, done: calls.setdefault(stage, []).append(done),
+    )
+    assert list(calls) == ["contract", "fit"]
+    for done in calls.values():
+        assert done == sorted(done)
+        assert len(done) > 5 and done[-1] == 1.0
 
     def cancel(stage, done):
         raise KeyboardInterrupt

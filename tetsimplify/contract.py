@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_extremes
-from tetsimplify.engine import Engine
+from tetsimplify.engine import Engine, Result
+from tetsimplify.fit import Links, fit_vertices
 from tetsimplify.mesh import Mesh
-from tetsimplify.options import Progress
+from tetsimplify.options import Progress, cosine_of
 from tetsimplify.report import Repaired, Simplification, SimplificationReport
 from tetsimplify.schedule import run
-from tetsimplify.topology import topology
+from tetsimplify.topology import Examined, examine
 from tetsimplify.within import run_within
 
 Data = dict[str, NDArray[Any]]
@@ -71,7 +72,10 @@ def contract(
     with clock.stage("report"):
         weights = engine.vertex_weights() if vertex_data else None
         result = engine.result
-        after = topology(result.vertices, result.faces, threads=engine.n_threads)
+        examined = examine(result.faces.reshape(-1), len(result.vertices), threads=engine.n_threads)
+    if mesh is not None and options.fits:
+        with clock.stage("fit"):
+            result = _fitted(engine, mesh, result, examined, locked, progress)
 
     report = SimplificationReport(
         options=options,
@@ -84,7 +88,7 @@ def contract(
         n_rounds=n_rounds,
         seconds=clock.seconds,
         topology_before=engine.topology_before,
-        topology_after=after,
+        topology_after=examined.report,
         shortest_edge_before=float(shortest_before),
         shortest_edge_after=float(result.shortest_edge),
         remaining_edges=result.remaining_edges,
@@ -99,6 +103,30 @@ def contract(
         {} if weights is None else weights.carry(vertex_data, result.vertex_map),
         {name: data[result.face_map] for name, data in face_data.items()},
     )
+
+
+def _fitted(
+    engine: Engine,
+    mesh: Mesh,
+    result: Result,
+    examined: Examined,
+    locked: NDArray[np.bool_],
+    progress: Progress | None,
+) -> Result:
+    """The result with its vertices moved nearer to the mesh given; those that are locked stay."""
+    held = (examined.loop >= 0).astype(np.uint8)
+    kept = result.vertex_map[locked]
+    held[kept[kept >= 0]] = 1
+    options, crew = engine.options, Crew(engine.n_threads)
+    vertices = fit_vertices(
+        *(mesh, Mesh(result.vertices, result.faces), result.vertex_map, held),
+        *(Links(examined.first_corner, examined.next_corner), engine.n_threads),
+        cos_turn=cosine_of(options.foldover),
+        cos_feature=None if options.feature_angle is None else cosine_of(options.feature_angle),
+        progress=progress,
+    )
+    shortest, _ = edge_extremes(Mesh(vertices, result.faces), crew)
+    return result._replace(vertices=vertices, shortest_edge=shortest)
 
 
 def after_repair(result: Simplification, repaired: Repaired) -> Simplification:

@@ -75,6 +75,7 @@ class Options:
     normal_deviation: float | str | None = "auto"
     shape: float | str | None = "auto"
     intersections: str = "allow"
+    fit: bool | str = "auto"
 
     def __post_init__(self) -> None:
         for name, high in (
@@ -101,6 +102,8 @@ class Options:
         _check_choice("intersections", self.intersections, INTERSECTIONS)
         if self.intersections == "prevent" and self.blocked == "violate":
             raise OptionError("intersections='prevent' needs a topology that is kept")
+        if self.fit != "auto" and not isinstance(self.fit, bool):
+            raise OptionError(f"fit must be True, False or 'auto', got {self.fit!r}")
         if not any(getattr(self, name) is not None for name in CRITERIA):
             raise OptionError(f"give at least one of {', '.join(CRITERIA)}")
         if self.feature_angle is not None and self.by_length:
@@ -109,6 +112,8 @@ class Options:
                     "feature_angle needs cost='quadric' or placement='quadric', got "
                     f"cost={self.cost!r} and placement={self.placement!r}"
                 )
+        if self.fit is True and (obstacle := self._obstacle_to_fit()) is not None:
+            raise OptionError(f"fit=True {obstacle}")
 
     @property
     def by_length(self) -> bool:
@@ -130,6 +135,31 @@ class Options:
             return self.placement
         plain = self.by_length and self.feature_angle is None
         return "midpoint" if plain else "quadric"
+
+    @property
+    def fits(self) -> bool:
+        """Whether the vertices are moved nearer to the mesh given in the end."""
+        return self.fit is not False and self._obstacle_to_fit() is None
+
+    def _obstacle_to_fit(self) -> str | None:
+        """Why vertices must not be moved in the end, None if they may."""
+        if self.by_length or self.chosen_placement != "quadric":
+            return (
+                "needs cost='quadric' and placement='quadric', got "
+                f"cost={self.cost!r} and placement={self.placement!r}"
+            )
+        if self.target_faces is None and self.keep_ratio is None:
+            return "needs target_faces or keep_ratio"
+        for name in ("max_edge_length", "max_error", "max_quadric_error"):
+            if getattr(self, name) is not None:
+                return f"cannot be with {name}, which it might break"
+        if not isinstance(self.normal_deviation, str | None):
+            return "cannot be with a normal_deviation that is asked for, which it might break"
+        if self.intersections != "allow":
+            return f"cannot be with intersections={self.intersections!r}, which it might break"
+        if self.blocked == "violate":
+            return "needs a topology that is kept, not blocked='violate'"
+        return None
 
     @property
     def uses_quadrics(self) -> bool:
@@ -171,8 +201,8 @@ class Options:
             blocked=BLOCKED.index(self.blocked),
             removal_limit2=float(limit) * float(limit),
             removal_edges2=in_edges * in_edges,
-            cos_foldover=_cosine(self.foldover),
-            cos_deviation=_cosine(self.guard("normal_deviation")),
+            cos_foldover=cosine_of(self.foldover),
+            cos_deviation=cosine_of(self.guard("normal_deviation")),
             shape=float(self.guard("shape") or 0.0),
             optimum=placement.optimum,
             places=np.array(placement.places),
@@ -189,7 +219,7 @@ CRITERIA = ("max_edge_length", "target_faces", "keep_ratio", "max_error", "max_q
 """Of these one must be given; where there are several, the first that is reached stops."""
 
 
-def _cosine(degrees: float | None) -> float:
+def cosine_of(degrees: float | None) -> float:
     """Cosine of the angle of a guard, and what switches it off for None."""
     return kernels.guards.NO_GUARD if degrees is None else math.cos(math.radians(degrees))
 

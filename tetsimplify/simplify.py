@@ -38,6 +38,7 @@ def simplify(
     normal_deviation: float | str | None = "auto",
     shape: float | str | None = "auto",
     intersections: str = "allow",
+    fit: bool | str = "auto",
     locked: ArrayLike | None = None,
     seams: ArrayLike | str | Sequence[str] | None = None,
     repair: bool = False,
@@ -117,6 +118,12 @@ def simplify(
         None is no such thing; "auto" is 0.9 by quadric error and None by length.
     intersections : {"allow", "prevent"}
         With "prevent" no two faces come to cross that did not cross before, told exactly; slower.
+    fit : {"auto", True, False}
+        Whether the vertices are moved a little in the end, so that the faces are nearer to the
+        surface given (Hoppe et al. 1993). "auto" does so by quadric error, with that placement,
+        where a number of faces is asked for and nothing that it could break: no largest edge or
+        error, ``intersections="prevent"`` or ``blocked="violate"``. Vertices on the boundary,
+        locked ones, those on seams and, with `feature_angle`, on features stay where they are.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
     seams : array_like or str or sequence of str, optional
@@ -179,6 +186,9 @@ def simplify(
     M. Garland and P. S. Heckbert. Surface simplification using quadric error metrics.
     SIGGRAPH 1997, 209-216. https://doi.org/10.1145/258734.258849
 
+    H. Hoppe, T. DeRose, T. Duchamp, J. McDonald and W. Stuetzle. Mesh optimization.
+    SIGGRAPH 1993, 19-26. https://doi.org/10.1145/166117.166119
+
     Examples
     --------
     >>> import numpy as np
@@ -210,6 +220,7 @@ def simplify(
         "normal_deviation": normal_deviation,
         "shape": shape,
         "intersections": intersections,
+        "fit": fit,
     }
     data: dict[str, Any] = {"vertex_data": vertex_data, "face_data": face_data}
     more: dict[str, Any] = {

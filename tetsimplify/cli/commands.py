@@ -148,6 +148,16 @@ def simplify(
             rich_help_panel=CONTRACTIONS,
         ),
     ] = None,
+    fit: Annotated[
+        bool | None,
+        typer.Option(
+            "--fit/--no-fit",
+            help="Move the vertices nearer to the surface given in the end; so by default where "
+            "a number of faces is asked for by quadric error.",
+            show_default=False,
+            rich_help_panel=CONTRACTIONS,
+        ),
+    ] = None,
     removal_limit: Annotated[
         str | None,
         typer.Option(
@@ -241,6 +251,7 @@ def simplify(
                 "foldover": foldover,
                 "normal_deviation": normal_deviation,
                 "shape": shape,
+                "fit": fit,
             }
         )
         volume_options = {

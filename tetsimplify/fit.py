@@ -1,0 +1,338 @@
+"""Vertices of a simplified mesh, moved so that it is nearer to the mesh given.
+
+Contraction puts each vertex where the planes merged into it want it. What counts in the end is how
+far the faces are from the surface given. So samples of that are taken, each is given to the nearest
+face of the result, and all vertices move a little so that the squared heights of the samples above
+their faces become least: see kernels/samples.py and kernels/fit.py. Faces and topology stay.
+
+The work is done in parts that depend on the meshes alone, and so does the result.
+"""
+
+from __future__ import annotations
+
+import math
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tetsimplify import kernels
+from tetsimplify.crew import Crew
+from tetsimplify.memory import cache_lines
+from tetsimplify.mesh import Mesh
+from tetsimplify.options import Progress
+
+if TYPE_CHECKING:
+    from tetsimplify.kernels.fit import Solver
+    from tetsimplify.kernels.samples import Desk, Samples, Stars
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+VERTICES = 2**13  # in a part: within it each vertex knows the new places of those before it
+FACES = 2**14  # in a part
+GROUP_BITS = 14  # of faces whose samples are added up together: their sums fit the cache of a core
+SAMPLES = 2**15  # in a part
+
+COS_TURN = 0.7  # of the largest angle by which a face may turn
+EXACT = 1e-9  # of the size of the mesh: a height that is as good as none
+FLAT = 1e-3  # of the edges around: the height of faces that are not to be pulled from what they fit
+REACH = 3.0  # in root mean squared heights: how far a vertex may go in a round
+
+
+class Plan(NamedTuple):
+    """How much is done."""
+
+    per_face: float
+    """Samples for each face of the result."""
+    rounds: int
+    """How often samples are taken."""
+    sweeps: int
+    """Over the equations of a round."""
+    stiffness: float
+    pull: float
+    """See `kernels.fit.Solver`."""
+
+
+FEW = (
+    20  # faces given for one that is left: where more are, there is time for more, and more to gain
+)
+LIGHT = Plan(per_face=3.5, rounds=1, sweeps=1, stiffness=0.01, pull=0.2)
+THOROUGH = Plan(per_face=10.0, rounds=2, sweeps=3, stiffness=0.0015, pull=0.3)
+
+
+class Links(NamedTuple):
+    """The corner table of a mesh, see kernels/corners.py, as `topology.examine` makes it."""
+
+    first_corner: Indices
+    """Shape (n,)."""
+    next_corner: Indices
+    """Shape (3 m,)."""
+
+
+def fit_vertices(
+    given: Mesh,
+    made: Mesh,
+    vertex_map: Indices,
+    held: NDArray[np.uint8],
+    links: Links,
+    threads: int,
+    *,
+    cos_turn: float = COS_TURN,
+    cos_feature: float | None = None,
+    progress: Progress | None = None,
+) -> Array:
+    """Move the vertices of a simplified mesh nearer to the mesh given.
+
+    Parameters
+    ----------
+    given : Mesh
+    made : Mesh
+        What became of it.
+    vertex_map : ndarray, shape (n given,), int32
+        The vertex that each one given was merged into, -1 where it was removed.
+    held : ndarray, shape (n,), uint8
+        Which vertices stay exactly where they are. More are marked, with `cos_feature`.
+    links : Links
+        Of the mesh made, corners in order.
+    threads : int
+        The result does not depend on it.
+    cos_turn : float
+        Cosine of the largest angle by which a face may turn. It may not lose more than half of
+        its area either.
+    cos_feature : float, optional
+        Cosine of the angle from which on the vertices of an edge are held.
+    progress : callable, optional
+        Called as ``progress("fit", done)``. Raise from it to cancel.
+
+    Returns
+    -------
+    ndarray, shape (n, 3), float64
+    """
+    size = _size(made)
+    if len(made.faces) in (0, len(given.faces)) or not 0.0 < size < math.inf:
+        return made.vertices
+    plan = THOROUGH if len(given.faces) >= FEW * len(made.faces) else LIGHT
+    n_tasks = 3 + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
+    fit = _Fit(made, held, links, size, Crew(threads, progress, "fit", n_tasks))
+    for i in range(plan.rounds):
+        fit.measure()
+        if cos_feature is not None and i == 0:
+            fit.hold_features(cos_feature)
+        fit.take_samples(given, vertex_map, plan, i)
+        fit.solve(plan)
+        fit.move(max(cos_turn, COS_TURN))
+    return fit.vertices()
+
+
+def _size(mesh: Mesh) -> float:
+    """The longest side of the box around the vertices."""
+    if not len(mesh.vertices):
+        return 0.0
+    low, high = kernels.order.bounds(mesh.vertices)
+    return float((high - low).max())
+
+
+class _Fit:
+    """What a fit works on.
+
+    Parameters
+    ----------
+    made : Mesh
+    held : ndarray, shape (n,), uint8
+    links : Links
+    size : float
+    crew : Crew
+    """
+
+    def __init__(
+        self, made: Mesh, held: NDArray[np.uint8], links: Links, size: float, crew: Crew
+    ) -> None:
+        n, m = len(made.vertices), len(made.faces)
+        self._made, self._held, self._crew = made, held, crew
+        self._links = tuple(links)
+        self._corner_vertex = made.faces.reshape(-1)
+        low, high = kernels.order.bounds(made.vertices)
+        # a power of two: so a mesh twice as large gives the same
+        self._frame = low + 0.5 * (high - low), 2.0 ** -math.frexp(size)[1]
+        self._places = np.empty((n, 3))
+        self._normals = np.empty((m, 4))
+        self._first_normals: Array | None = None
+        self._steps, self._steps_before = np.empty((n, 3)), np.zeros((n, 3))
+        self._sums = cache_lines(m).view(np.float32)
+        self._samples: Samples | None = None
+        self._desks: SimpleQueue[Desk] = SimpleQueue()
+
+        def enter(part: slice) -> None:
+            kernels.fit.enter_frame(
+                made.vertices, *self._frame, part.start, part.stop, self._places
+            )
+
+        crew.share(enter, n, VERTICES)
+        self._stars = self._new_stars()
+
+    def _new_stars(self) -> Stars:
+        """Room for the faces around each vertex."""
+        n, kernel = len(self._places), kernels.samples
+        first = np.empty(n + 1, np.int32)
+
+        def count(part: slice) -> int:
+            return int(kernel.count_blocks(*self._links, part.start, part.stop, first))
+
+        def give(part: slice) -> None:
+            kernel.number_blocks(part.start, part.stop, begin[part.start // VERTICES], first)
+
+        begin = np.cumsum([0, *self._crew.share(count, n, VERTICES)])
+        Crew(self._crew.n_threads).share(give, n, VERTICES)
+        first[n] = begin[-1]
+        lanes = np.empty((int(begin[-1]), kernel.N_ROWS, kernel.LANES), np.float32)
+        stars: Stars = kernel.Stars(
+            first, lanes, lanes.view(np.int32), lanes.reshape(-1, kernel.LANES)
+        )
+        return stars
+
+    def measure(self) -> None:
+        """Find normals, areas and stars as they are now."""
+        if self._first_normals is None:
+            self._first_normals = self._normals
+        elif self._first_normals is self._normals:
+            self._normals = np.empty_like(self._normals)
+
+        def find_normals(part: slice) -> None:
+            kernels.samples.find_normals(
+                self._places, self._made.faces, part.start, part.stop, self._normals
+            )
+
+        def fill(part: slice) -> None:
+            kernels.samples.fill_stars(
+                *(self._places, self._corner_vertex, self._links, self._normals),
+                *(part.start, part.stop, self._stars),
+            )
+
+        self._crew.share(find_normals, len(self._normals), FACES)
+        self._crew.share(fill, len(self._places), VERTICES)
+
+    def hold_features(self, cosine: float) -> None:
+        """Hold the vertices at which neighbouring faces turn by more."""
+
+        def hold(part: slice) -> None:
+            kernels.fit.hold_features(
+                self._links, self._normals, cosine, part.start, part.stop, self._held
+            )
+
+        self._crew.share(hold, len(self._places), VERTICES)
+
+    def take_samples(self, given: Mesh, vertex_map: Indices, plan: Plan, which: int) -> None:
+        """Take samples of the mesh given, and add them up for each face."""
+        n_given, m = len(given.faces), len(self._normals)
+        stride = max(1, round(n_given / (plan.per_face * m)))
+        offset = which * stride // plan.rounds
+        n_samples = -(-(n_given - offset) // stride)
+        if self._samples is None or len(self._samples.face) < n_samples:
+            self._samples = _new_samples(n_samples)
+        samples = self._samples
+        n_groups = ((m - 1) >> GROUP_BITS) + 1
+        ends = np.empty((-(-n_samples // SAMPLES), n_groups + 1), np.int64)
+
+        def take(part: slice) -> None:
+            desk = self._take_desk()
+            n = kernels.samples.take_samples(
+                *((*given, vertex_map), self._frame, self._places),
+                *(self._corner_vertex, self._normals, self._stars),
+                *((part.start, part.stop, stride, offset), desk),
+            )
+            kernels.samples.sort_samples(
+                desk.samples, n, GROUP_BITS, part.start, ends[part.start // SAMPLES], samples
+            )
+            self._desks.put(desk)
+
+        def add_up(part: slice) -> None:
+            group = part.start >> GROUP_BITS
+            kernels.fit.sum_samples(
+                samples, ends, group, part.start, part.stop, EXACT**2, self._sums
+            )
+
+        self._crew.share(take, n_samples, SAMPLES)
+        self._crew.share(add_up, m, 2**GROUP_BITS)
+
+    def _take_desk(self) -> Desk:
+        """A desk that is free, or a new one."""
+        try:
+            return self._desks.get_nowait()
+        except Empty:
+            return _new_desk()
+
+    def solve(self, plan: Plan) -> None:
+        """Find the steps of all vertices."""
+        solver: Solver = kernels.fit.Solver(plan.stiffness, plan.pull, EXACT**2, FLAT**2, REACH**2)
+
+        def solve(part: slice) -> None:
+            kernels.fit.solve(
+                *(self._places, self._corner_vertex, self._links, self._normals, self._sums),
+                *(self._held, solver, part.start, part.stop, self._steps_before, self._steps),
+            )
+
+        self._steps_before.fill(0.0)
+        for i in range(plan.sweeps):
+            if i:
+                self._steps, self._steps_before = self._steps_before, self._steps
+            self._crew.share(solve, len(self._places), VERTICES)
+
+    def move(self, cos_turn: float) -> None:
+        """Take back steps that harm faces, until none does, and do the others."""
+        n, m = len(self._places), len(self._normals)
+        harmed, stale = np.zeros(n, np.uint8), np.ones(n, np.uint8)
+
+        def find_harmed(part: slice) -> None:
+            kernels.fit.find_harmed(
+                *(self._places, self._made.faces, self._first_normals, self._steps, cos_turn),
+                *(stale, part.start, part.stop, harmed),
+            )
+
+        def take_back(part: slice) -> int:
+            return int(kernels.fit.take_back(part.start, part.stop, self._steps, harmed, stale))
+
+        def move(part: slice) -> None:
+            kernels.fit.move(part.start, part.stop, self._steps, self._places)
+
+        crew = self._crew
+        while True:
+            crew.share(find_harmed, m, FACES)
+            if not sum(crew.share(take_back, n, VERTICES)):
+                break
+            crew = Crew(crew.n_threads)  # how often is not known before
+        self._crew.share(move, n, VERTICES)
+
+    def vertices(self) -> Array:
+        """The vertices where they are now; shape (n, 3)."""
+        moved = np.empty_like(self._places)
+
+        def leave(part: slice) -> None:
+            kernels.fit.leave_frame(
+                *(self._made.vertices, *self._frame, part.start, part.stop),
+                *(self._places, moved),
+            )
+
+        self._crew.share(leave, len(moved), VERTICES)
+        return moved
+
+
+def _new_samples(n: int) -> Samples:
+    samples: Samples = kernels.samples.Samples(np.empty(n, np.int32), np.empty((n, 3), np.float32))
+    return samples
+
+
+def _new_desk() -> Desk:
+    kernel = kernels.samples
+    distance2 = np.empty(kernel.LANES, np.float32)
+    desk: Desk = kernel.Desk(
+        place=np.empty((kernel.BATCH, 6)),
+        found=np.empty((kernel.BATCH, 2), np.int32),
+        weights=np.empty((kernel.BATCH, 2)),
+        distance2=distance2,
+        bits=distance2.view(np.int32),
+        turned=np.empty(3, np.float32),
+        samples=_new_samples(SAMPLES),
+    )
+    return desk

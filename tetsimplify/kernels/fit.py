@@ -1,0 +1,324 @@
+r"""Vertices moved so that the surface is nearer to samples of another one.
+
+One linearisation of the energy of Hoppe, DeRose, Duchamp, McDonald and Stuetzle (Mesh optimization,
+SIGGRAPH 1993, https://doi.org/10.1145/166117.166119) with the faces as they are. A sample, see
+samples.py, is above the point with barycentric coordinates l of its nearest face, with the normal
+n, at the height r. When the corners j of that face move by d_j, the height becomes r - sum of
+l_j n.d_j. So what is minimised is
+
+    sum over faces of w * sum over samples of (r - sum over j of l_j n.d_j)^2  +  mu w |d - g|^2
+
+and all that is needed of the samples of a face are ten sums: of l l', of l r and of r^2. The weight
+w is one over the square root of the root mean squared height of the face: between least squares
+and least distances, so that faces that fit already hold what they have. g pulls a vertex towards
+the middle of its neighbours, in the surface, which keeps the triangles well shaped.
+
+All lengths are those of a frame in which the surface has a size of about one.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tetsimplify.kernels.corners import behind, face_of, others
+from tetsimplify.kernels.jit import kernel_in_place, part
+
+TINY = 1e-300  # in place of zero as a divisor
+MOST_FLAT = 1e6  # times as stiff a spring may become
+
+# Columns of the sums of a face: of l l for each corner, of l l' for each and the one ahead, of l r;
+# how many samples, of r^2, and the weight of all. The first nine are weighted.
+SQUARE, PRODUCT, RIGHT, COUNT, R2, WEIGHT = 0, 3, 6, 9, 10, 11
+N_COLUMNS = 16  # a line of a cache
+
+
+class Solver(NamedTuple):
+    """What says how far vertices go."""
+
+    stiffness: float  # mu
+    pull: float  # part of the way to the middle of the neighbours at which the spring is at rest
+    exact2: float  # squared height of what is as good as exact
+    flat2: float  # of squared edges: squared height of faces that hold what they have
+    reach2: float  # squared, in rms heights: how far a vertex may go
+
+
+@kernel_in_place
+def enter_frame(vertices, origin, scale, first, last, places):
+    """Put the vertices from `first` to `last` into the frame."""
+    for v in range(first, last):
+        for axis in range(3):
+            places[v, axis] = (vertices[v, axis] - origin[axis]) * scale
+
+
+@kernel_in_place
+def leave_frame(vertices, origin, scale, first, last, places, moved):
+    """Move the vertices from `first` to `last` as their places have; others keep every bit.
+
+    Parameters
+    ----------
+    vertices : float64 (n, 3)
+    origin : float64 (3,)
+    scale : float
+    first, last : int
+    places : float64 (n, 3)
+    moved : float64 (n, 3), out
+    """
+    for v in range(first, last):
+        for axis in range(3):
+            step = places[v, axis] - (vertices[v, axis] - origin[axis]) * scale
+            moved[v, axis] = vertices[v, axis]
+            if step != 0.0:
+                moved[v, axis] += step / scale
+
+
+@kernel_in_place
+def hold_features(links, normals, cosine, first, last, held):
+    """Hold those of the vertices from `first` to `last` where faces side by side turn by more.
+
+    Parameters
+    ----------
+    links : tuple
+        `first_corner`, int32 (n,), and `next_corner`, int32 (3 m,), the corner table, in order.
+    normals : float64 (m, 4)
+    cosine : float
+        Of the angle.
+    first, last : int
+    held : uint8 (n,)
+    """
+    first_corner, next_corner = links
+    for v in range(first, last):
+        corner = first_corner[v]
+        while corner >= 0:
+            here, there = normals[face_of(corner)], normals[face_of(next_corner[corner])]
+            if here[0] * there[0] + here[1] * there[1] + here[2] * there[2] < cosine:
+                held[v] = 1
+            corner = next_corner[corner]
+            if corner == first_corner[v]:
+                break
+
+
+@kernel_in_place
+def sum_samples(samples, ends, group, first, last, exact2, sums):
+    """Add up the samples of a group of faces, from `first` to `last`, and weight the sums.
+
+    Parameters
+    ----------
+    samples : Samples
+    ends : int64 (n_parts, n_groups + 1)
+        Where the samples of each group begin in each part.
+    group : int
+    first, last : int
+    exact2 : float
+        Squared height of what is as good as exact.
+    sums : float32 (m, N_COLUMNS), out
+    """
+    sums[first:last] = 0.0
+    for k in range(len(ends)):
+        for i in range(ends[k, group], ends[k, group + 1]):
+            _add_sample(samples.foot[i], sums[samples.face[i]])
+    for f in range(first, last):
+        of_face = sums[f]
+        if of_face[COUNT] > 0.0:
+            mean2 = np.float64(of_face[R2]) / of_face[COUNT] + exact2
+            weight = np.float32(1.0 / np.sqrt(np.sqrt(mean2)))
+            for column in range(COUNT):
+                of_face[column] *= weight
+            of_face[WEIGHT] = weight * of_face[COUNT]
+
+
+@part
+def _add_sample(foot, of_face):
+    """Add a sample to the sums of its face."""
+    a, b, r = foot[0], foot[1], foot[2]
+    c = np.float32(1.0) - a - b
+    of_face[SQUARE] += a * a
+    of_face[SQUARE + 1] += b * b
+    of_face[SQUARE + 2] += c * c
+    of_face[PRODUCT] += a * b
+    of_face[PRODUCT + 1] += b * c
+    of_face[PRODUCT + 2] += c * a
+    of_face[RIGHT] += a * r
+    of_face[RIGHT + 1] += b * r
+    of_face[RIGHT + 2] += c * r
+    of_face[COUNT] += np.float32(1.0)
+    of_face[R2] += r * r
+
+
+@kernel_in_place
+def solve(places, corner_vertex, links, normals, sums, held, solver, first, last, before, steps):
+    """One step of Gauss and Seidel for the vertices from `first` to `last`.
+
+    Others, and those after a vertex, count with the steps that they had before: so ranges may be
+    worked on side by side.
+
+    Parameters
+    ----------
+    places : float64 (n, 3)
+    corner_vertex : int32 (3 m,)
+    links : tuple
+        As of `hold_features`.
+    normals : float64 (m, 4)
+    sums : float32 (m, N_COLUMNS)
+    held : uint8 (n,)
+        Which vertices stay.
+    solver : Solver
+    first, last : int
+    before : float64 (n, 3)
+        The steps before.
+    steps : float64 (n, 3), out
+    """
+    first_corner, next_corner = links
+    for v in range(first, last):
+        steps[v, 0] = steps[v, 1] = steps[v, 2] = 0.0
+        if held[v] or first_corner[v] < 0:
+            continue
+        xx = xy = xz = yy = yz = zz = gx = gy = gz = 0.0
+        weight = r2 = count = around = 0.0
+        mx = my = mz = ox = oy = oz = far2 = 0.0
+        exactest = np.inf
+        corner = first_corner[v]
+        while True:
+            f = face_of(corner)
+            p, q = others(corner_vertex, corner)
+            of_face = sums[f]
+            nx, ny, nz = normals[f, 0], normals[f, 1], normals[f, 2]
+            k = corner - 3 * f
+            own, right = np.float64(of_face[SQUARE + k]), np.float64(of_face[RIGHT + k])
+            with_p, with_q = of_face[PRODUCT + k], of_face[PRODUCT + behind(corner) - 3 * f]
+            to_p = steps if first <= p < v else before
+            to_q = steps if first <= q < v else before
+            right -= with_p * (nx * to_p[p, 0] + ny * to_p[p, 1] + nz * to_p[p, 2])
+            right -= with_q * (nx * to_q[q, 0] + ny * to_q[q, 1] + nz * to_q[q, 2])
+            sx, sy, sz = own * nx, own * ny, own * nz
+            xx += sx * nx
+            xy += sx * ny
+            xz += sx * nz
+            yy += sy * ny
+            yz += sy * nz
+            zz += sz * nz
+            gx += right * nx
+            gy += right * ny
+            gz += right * nz
+            weight += of_face[WEIGHT]
+            r2 += of_face[R2]
+            count += of_face[COUNT]
+            if of_face[COUNT] > 0.0:
+                exactest = min(exactest, np.float64(of_face[R2]) / of_face[COUNT])
+            ux, uy, uz = (
+                places[p, 0] - places[v, 0],
+                places[p, 1] - places[v, 1],
+                places[p, 2] - places[v, 2],
+            )
+            wx, wy, wz = (
+                places[q, 0] - places[v, 0],
+                places[q, 1] - places[v, 1],
+                places[q, 2] - places[v, 2],
+            )
+            mx += ux + wx
+            my += uy + wy
+            mz += uz + wz
+            far2 += ux * ux + uy * uy + uz * uz + wx * wx + wy * wy + wz * wz
+            ox += nx
+            oy += ny
+            oz += nz
+            around += 2.0
+            corner = next_corner[corner]
+            if corner == first_corner[v]:
+                break
+        if not r2 > solver.exact2 * count:  # nothing to be nearer to, or as near as can be
+            continue
+        # Beside a face that fits, others come nearer at its expense only: there the spring is
+        # stiffer, and at rest where the vertex is.
+        flat = min(solver.flat2 * far2 / around / max(exactest, TINY), MOST_FLAT)
+        pull = solver.stiffness * weight * solver.pull / (1.0 + flat) / around
+        spring = solver.stiffness * weight * (1.0 + flat)
+        xx += spring
+        yy += spring
+        zz += spring
+        oo = ox * ox + oy * oy + oz * oz
+        out = (mx * ox + my * oy + mz * oz) / oo if oo > 0.0 else 0.0
+        gx += pull * (mx - out * ox)
+        gy += pull * (my - out * oy)
+        gz += pull * (mz - out * oz)
+        ixx, ixy, ixz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+        iyy, iyz, izz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+        s = 1.0 / (xx * ixx + xy * ixy + xz * ixz)
+        x = s * (ixx * gx + ixy * gy + ixz * gz)
+        y = s * (ixy * gx + iyy * gy + iyz * gz)
+        z = s * (ixz * gx + iyz * gy + izz * gz)
+        # Where the faces turn, which of them is nearest is less certain.
+        certainty = max(8.0 * oo / (around * around) - 1.0, 0.0)
+        length2, most2 = x * x + y * y + z * z, certainty * solver.reach2 * r2 / count
+        s = np.sqrt(most2 / length2) if length2 > most2 else 1.0
+        steps[v, 0], steps[v, 1], steps[v, 2] = s * x, s * y, s * z
+
+
+@kernel_in_place
+def find_harmed(places, faces, normals, steps, cosine, stale, first, last, harmed):
+    """Mark the vertices of faces that steps turn too far or make too small.
+
+    Parameters
+    ----------
+    places : float64 (n, 3)
+    faces : int32 (m, 3)
+    normals : float64 (m, 4)
+        As they were.
+    steps : float64 (n, 3)
+    cosine : float
+        Of the largest angle by which a face may turn.
+    stale : uint8 (n,)
+        Only faces with a vertex that is marked here are looked at.
+    first, last : int
+        Range of faces.
+    harmed : uint8 (n,)
+        Marked with 1.
+    """
+    for f in range(first, last):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if not (stale[a] | stale[b] | stale[c]):
+            continue
+        ax, ay, az = (
+            places[a, 0] + steps[a, 0],
+            places[a, 1] + steps[a, 1],
+            places[a, 2] + steps[a, 2],
+        )
+        ux, uy, uz = (
+            places[b, 0] + steps[b, 0] - ax,
+            places[b, 1] + steps[b, 1] - ay,
+            places[b, 2] + steps[b, 2] - az,
+        )
+        wx, wy, wz = (
+            places[c, 0] + steps[c, 0] - ax,
+            places[c, 1] + steps[c, 1] - ay,
+            places[c, 2] + steps[c, 2] - az,
+        )
+        x, y, z = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        length = np.sqrt(x * x + y * y + z * z)
+        along = x * normals[f, 0] + y * normals[f, 1] + z * normals[f, 2]
+        if not (along > cosine * length and length >= normals[f, 3]):  # twice the area, and half
+            harmed[a] = harmed[b] = harmed[c] = 1
+
+
+@kernel_in_place
+def take_back(first, last, steps, harmed, stale):
+    """Take back the steps of marked vertices from `first` to `last`; return how many.
+
+    Those are then marked as `stale`, and nothing is as `harmed`.
+    """
+    n = 0
+    for v in range(first, last):
+        moves = steps[v, 0] != 0.0 or steps[v, 1] != 0.0 or steps[v, 2] != 0.0
+        stale[v] = harmed[v] != 0 and moves
+        harmed[v] = 0
+        if stale[v]:
+            steps[v, 0] = steps[v, 1] = steps[v, 2] = 0.0
+            n += 1
+    return n
+
+
+@kernel_in_place
+def move(first, last, steps, places):
+    """Move the vertices from `first` to `last`."""
+    for v in range(first, last):
+        for axis in range(3):
+            places[v, axis] += steps[v, axis]
