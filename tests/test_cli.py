@@ -241,11 +241,11 @@ def test_options_by_quadric_error(mesh_path, tmp_path):
     result = run_json(
         "simplify", mesh_path, "-o", tmp_path / "a.ply", "--keep-ratio", 0.5, "--cost", "length",
         "--placement", "quadric", "--boundary", "keep", "--feature-angle", 40,
-        "--normal-deviation", 60, "--shape", "off", "--removal-limit", "inf",
+        "--normal-deviation", 60, "--shape", "off", "--removal-limit", "inf", "--no-fit",
     )  # fmt: skip
     expected = {"keep_ratio": 0.5, "cost": "length", "placement": "quadric", "boundary": "keep",
                 "feature_angle": 40, "normal_deviation": 60, "shape": None,
-                "removal_limit": "inf"}  # fmt: skip
+                "removal_limit": "inf", "fit": False}  # fmt: skip
     assert {name: result["options"][name] for name in expected} == expected
 
 
@@ -268,6 +268,7 @@ def test_options_by_quadric_error(mesh_path, tmp_path):
         (["--max-error", ""], "--max-error must be a length"),
         (["--max-error", "1%", "--removal-limit", "4x"], "a multiple of --max-edge-length"),
         (["--max-error", "1%", "--normal-deviation", "much"], "an angle in degrees, or off"),
+        (["--max-error", "1%", "--fit"], "fit=True needs target_faces or keep_ratio"),
         (["--max-error", "1%", "--shape", "2"], "shape must be from 0 to 1"),
     ],
 )

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
-VERTICES = 2**13  # in a part: within it each vertex knows the new places of those before it
-FACES = 2**14  # in a part
-GROUP_BITS = 14  # of faces whose samples are added up together: their sums fit the cache of a core
-SAMPLES = 2**15  # in a part
+VERTICES = 2**12  # in a part: within it each vertex knows the steps of those before it
+AT_ONCE = 2**15  # vertices or faces in a part, where little is to be done
+GROUP_BITS = 13  # of faces whose samples are added up together: their sums fit the cache of a core
+SAMPLES = 2**13  # in a part
 
 COS_TURN = 0.7  # of the largest angle by which a face may turn
 EXACT = 1e-9  # of the size of the mesh: a height that is as good as none
@@ -169,7 +169,7 @@ class _Fit:
                 made.vertices, *self._frame, part.start, part.stop, self._places
             )
 
-        crew.share(enter, n, VERTICES)
+        crew.share(enter, n, AT_ONCE)
         self._stars = self._new_stars()
 
     def _new_stars(self) -> Stars:
@@ -210,7 +210,7 @@ class _Fit:
                 *(part.start, part.stop, self._stars),
             )
 
-        self._crew.share(find_normals, len(self._normals), FACES)
+        self._crew.share(find_normals, len(self._normals), AT_ONCE)
         self._crew.share(fill, len(self._places), VERTICES)
 
     def hold_features(self, cosine: float) -> None:
@@ -250,7 +250,7 @@ class _Fit:
         def add_up(part: slice) -> None:
             group = part.start >> GROUP_BITS
             kernels.fit.sum_samples(
-                samples, ends, group, part.start, part.stop, EXACT**2, self._sums
+                samples, ends, self._normals, group, part.start, part.stop, EXACT**2, self._sums
             )
 
         self._crew.share(take, n_samples, SAMPLES)
@@ -269,7 +269,7 @@ class _Fit:
 
         def solve(part: slice) -> None:
             kernels.fit.solve(
-                *(self._places, self._corner_vertex, self._links, self._normals, self._sums),
+                *(self._places, self._corner_vertex, self._links, self._sums),
                 *(self._held, solver, part.start, part.stop, self._steps_before, self._steps),
             )
 
@@ -298,11 +298,11 @@ class _Fit:
 
         crew = self._crew
         while True:
-            crew.share(find_harmed, m, FACES)
-            if not sum(crew.share(take_back, n, VERTICES)):
+            crew.share(find_harmed, m, AT_ONCE)
+            if not sum(crew.share(take_back, n, AT_ONCE)):
                 break
             crew = Crew(crew.n_threads)  # how often is not known before
-        self._crew.share(move, n, VERTICES)
+        self._crew.share(move, n, AT_ONCE)
 
     def vertices(self) -> Array:
         """The vertices where they are now; shape (n, 3)."""
@@ -314,7 +314,7 @@ class _Fit:
                 *(self._places, moved),
             )
 
-        self._crew.share(leave, len(moved), VERTICES)
+        self._crew.share(leave, len(moved), AT_ONCE)
         return moved
 
 

@@ -244,6 +244,7 @@ def test_targets_are_those_of_quadric_decimation(target):
         ({"optimalplacement": True}, {"placement": "quadric"}),
         ({"optimalplacement": False}, {"placement": "endpoint"}),
         ({"cost": "length"}, {"cost": "length"}),
+        ({"fit": False}, {"fit": False}),
         ({"featureangle": 20}, {"feature_angle": 20}),
         ({"maxquadricerror": PureValue(0.01)}, {"max_quadric_error": 0.01}),
         ({"maxerror": PureValue(0.02)}, {"max_error": 0.02}),

@@ -27,8 +27,9 @@ TINY = 1e-300  # in place of zero as a divisor
 MOST_FLAT = 1e6  # times as stiff a spring may become
 
 # Columns of the sums of a face: of l l for each corner, of l l' for each and the one ahead, of l r;
-# how many samples, of r^2, and the weight of all. The first nine are weighted.
-SQUARE, PRODUCT, RIGHT, COUNT, R2, WEIGHT = 0, 3, 6, 9, 10, 11
+# how many samples, of r^2, and the weight of all. The first nine are weighted. The normal is there
+# too, so that one line of a cache has all that is solved with.
+SQUARE, PRODUCT, RIGHT, COUNT, R2, WEIGHT, NORMAL = 0, 3, 6, 9, 10, 11, 12
 N_COLUMNS = 16  # a line of a cache
 
 
@@ -98,7 +99,7 @@ def hold_features(links, normals, cosine, first, last, held):
 
 
 @kernel_in_place
-def sum_samples(samples, ends, group, first, last, exact2, sums):
+def sum_samples(samples, ends, normals, group, first, last, exact2, sums):
     """Add up the samples of a group of faces, from `first` to `last`, and weight the sums.
 
     Parameters
@@ -106,6 +107,7 @@ def sum_samples(samples, ends, group, first, last, exact2, sums):
     samples : Samples
     ends : int64 (n_parts, n_groups + 1)
         Where the samples of each group begin in each part.
+    normals : float64 (m, 4)
     group : int
     first, last : int
     exact2 : float
@@ -118,6 +120,8 @@ def sum_samples(samples, ends, group, first, last, exact2, sums):
             _add_sample(samples.foot[i], sums[samples.face[i]])
     for f in range(first, last):
         of_face = sums[f]
+        for axis in range(3):
+            of_face[NORMAL + axis] = normals[f, axis]
         if of_face[COUNT] > 0.0:
             mean2 = np.float64(of_face[R2]) / of_face[COUNT] + exact2
             weight = np.float32(1.0 / np.sqrt(np.sqrt(mean2)))
@@ -145,7 +149,7 @@ def _add_sample(foot, of_face):
 
 
 @kernel_in_place
-def solve(places, corner_vertex, links, normals, sums, held, solver, first, last, before, steps):
+def solve(places, corner_vertex, links, sums, held, solver, first, last, before, steps):
     """One step of Gauss and Seidel for the vertices from `first` to `last`.
 
     Others, and those after a vertex, count with the steps that they had before: so ranges may be
@@ -157,7 +161,6 @@ def solve(places, corner_vertex, links, normals, sums, held, solver, first, last
     corner_vertex : int32 (3 m,)
     links : tuple
         As of `hold_features`.
-    normals : float64 (m, 4)
     sums : float32 (m, N_COLUMNS)
     held : uint8 (n,)
         Which vertices stay.
@@ -181,7 +184,9 @@ def solve(places, corner_vertex, links, normals, sums, held, solver, first, last
             f = face_of(corner)
             p, q = others(corner_vertex, corner)
             of_face = sums[f]
-            nx, ny, nz = normals[f, 0], normals[f, 1], normals[f, 2]
+            nx = np.float64(of_face[NORMAL])
+            ny = np.float64(of_face[NORMAL + 1])
+            nz = np.float64(of_face[NORMAL + 2])
             k = corner - 3 * f
             own, right = np.float64(of_face[SQUARE + k]), np.float64(of_face[RIGHT + k])
             with_p, with_q = of_face[PRODUCT + k], of_face[PRODUCT + behind(corner) - 3 * f]
