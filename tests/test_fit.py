@@ -155,7 +155,7 @@ def test_steps_solve_the_least_squares():
     mesh = meshes.icosphere(4)
     result = contracted(mesh, keep_ratio=0.1)
     stiffness = 0.05
-    plan = Plan(per_face=3.5, rounds=1, sweeps=300, stiffness=stiffness, pull=0.0)
+    plan = Plan(per_face=3.5, least_stride=1, rounds=1, sweeps=300, stiffness=stiffness, pull=0.0)
     fit = started(mesh, result, plan)
     n = len(result.vertices)
     matrix, right = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
@@ -313,7 +313,17 @@ def test_vertices_without_samples_stay():
 
 def test_nothing_moves_where_nothing_was_contracted():
     mesh = torus()
-    assert np.array_equal(tetsimplify.simplify(*mesh, keep_ratio=1.0).vertices, mesh.vertices)
+    result = tetsimplify.simplify(*mesh, keep_ratio=1.0, fit=True)
+    assert np.array_equal(result.vertices, mesh.vertices)
+
+
+def test_where_many_faces_are_left_only_by_request():
+    mesh = torus()
+    free = contracted(mesh, keep_ratio=0.5)
+    left_out = tetsimplify.simplify(*mesh, keep_ratio=0.5)
+    asked_for = tetsimplify.simplify(*mesh, keep_ratio=0.5, fit=True)
+    assert np.array_equal(left_out.vertices, free.vertices)
+    assert not np.array_equal(asked_for.vertices, free.vertices)
 
 
 # --- whatever the mesh ----------------------------------------------------------------------------
@@ -341,7 +351,7 @@ def test_a_mesh_made_of_noise_keeps_its_faces():
     mesh = tetsimplify.extract_isosurface(noise, 0.0)
     for ratio in (0.5, 0.1):
         before = contracted(mesh, keep_ratio=ratio)
-        after = tetsimplify.simplify(*mesh, keep_ratio=ratio)
+        after = tetsimplify.simplify(*mesh, keep_ratio=ratio, fit=True)
         assert_faces_kept(before.vertices, after.vertices, after.faces)
         assert_same_topology(mesh[1], after)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_extremes
 from tetsimplify.engine import Engine, Result
-from tetsimplify.fit import Links, fit_vertices
+from tetsimplify.fit import Links, fit_vertices, pays
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress, cosine_of
 from tetsimplify.report import Repaired, Simplification, SimplificationReport
@@ -114,12 +114,18 @@ def _fitted(
     progress: Progress | None,
 ) -> Result:
     """The result with its vertices moved nearer to the mesh given; those that are locked stay."""
+    options, crew, made = (
+        engine.options,
+        Crew(engine.n_threads),
+        Mesh(result.vertices, result.faces),
+    )
+    if options.fit is not True and not pays(mesh, made):
+        return result
     held = (examined.loop >= 0).astype(np.uint8)
     kept = result.vertex_map[locked]
     held[kept[kept >= 0]] = 1
-    options, crew = engine.options, Crew(engine.n_threads)
     vertices = fit_vertices(
-        *(mesh, Mesh(result.vertices, result.faces), result.vertex_map, held),
+        *(mesh, made, result.vertex_map, held),
         *(Links(examined.first_corner, examined.next_corner), engine.n_threads),
         cos_turn=cosine_of(options.foldover),
         cos_feature=None if options.feature_angle is None else cosine_of(options.feature_angle),

@@ -45,7 +45,9 @@ class Plan(NamedTuple):
     """How much is done."""
 
     per_face: float
-    """Samples for each face of the result."""
+    """Samples for each face of the result, in each round."""
+    least_stride: int
+    """Of so many faces given one has a sample in a round, at most."""
     rounds: int
     """How often samples are taken."""
     sweeps: int
@@ -55,11 +57,10 @@ class Plan(NamedTuple):
     """See `kernels.fit.Solver`."""
 
 
-FEW = (
-    20  # faces given for one that is left: where more are, there is time for more, and more to gain
-)
-LIGHT = Plan(per_face=3.5, rounds=1, sweeps=1, stiffness=0.01, pull=0.2)
-THOROUGH = Plan(per_face=10.0, rounds=2, sweeps=3, stiffness=0.0015, pull=0.3)
+LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly anything is gained
+FEW = 16.0  # where there are as many, there is time for more, and more to gain
+LIGHT = Plan(per_face=3.5, least_stride=1, rounds=1, sweeps=1, stiffness=0.01, pull=0.2)
+THOROUGH = Plan(per_face=10.0, least_stride=4, rounds=2, sweeps=2, stiffness=0.0015, pull=0.3)
 
 
 class Links(NamedTuple):
@@ -69,6 +70,11 @@ class Links(NamedTuple):
     """Shape (n,)."""
     next_corner: Indices
     """Shape (3 m,)."""
+
+
+def pays(given: Mesh, made: Mesh) -> bool:
+    """Whether enough faces are gone that it is worth the time."""
+    return len(given.faces) >= LEAST * len(made.faces)
 
 
 def fit_vertices(
@@ -226,7 +232,7 @@ class _Fit:
     def take_samples(self, given: Mesh, vertex_map: Indices, plan: Plan, which: int) -> None:
         """Take samples of the mesh given, and add them up for each face."""
         n_given, m = len(given.faces), len(self._normals)
-        stride = max(1, round(n_given / (plan.per_face * m)))
+        stride = max(plan.least_stride, round(n_given / (plan.per_face * m)))
         offset = which * stride // plan.rounds
         n_samples = -(-(n_given - offset) // stride)
         if self._samples is None or len(self._samples.face) < n_samples:

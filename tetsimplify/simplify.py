@@ -121,8 +121,9 @@ def simplify(
     fit : {"auto", True, False}
         Whether the vertices are moved a little in the end, so that the faces are nearer to the
         surface given (Hoppe et al. 1993). "auto" does so by quadric error, with that placement,
-        where a number of faces is asked for and nothing that it could break: no largest edge or
-        error, ``intersections="prevent"`` or ``blocked="violate"``. Vertices on the boundary,
+        where a number of faces is asked for, at most a third of them is left, and nothing is asked
+        for that it could break: no largest edge or error, no number for `normal_deviation`,
+        ``intersections="prevent"`` or ``blocked="violate"``. Vertices on the boundary,
         locked ones, those on seams and, with `feature_angle`, on features stay where they are.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
