@@ -72,6 +72,11 @@ def test_every_page_is_reached_from_the_index():
     assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_no_page_breaks_off(page):
+    assert page.read_text(encoding="utf-8").endswith((".\n", "```\n", "|\n"))
+
+
 def test_no_page_says_too_much():
     """Pages speak of the project, not of the machine that they were written on."""
     for page in PAGES:

@@ -38,6 +38,7 @@ SAMPLES = 2**13  # in a part
 COS_TURN = 0.7  # of the largest angle by which a face may turn
 EXACT = 1e-9  # of the size of the mesh: a height that is as good as none
 FLAT = 1e-3  # of the edges around: the height of faces that are not to be pulled from what they fit
+LARGEST = 1e300  # size of a mesh, and one over it: beyond, nothing is moved
 REACH = 3.0  # in root mean squared heights: how far a vertex may go in a round
 
 
@@ -117,7 +118,7 @@ def fit_vertices(
     ndarray, shape (n, 3), float64
     """
     size = _size(made)
-    if len(made.faces) in (0, len(given.faces)) or not 0.0 < size < math.inf:
+    if len(made.faces) in (0, len(given.faces)) or not 1.0 / LARGEST < size < LARGEST:
         return made.vertices
     plan = THOROUGH if len(given.faces) >= FEW * len(made.faces) else LIGHT
     n_tasks = 3 + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
