@@ -63,6 +63,7 @@ class _Order(NamedTuple):
 
 
 def _arrange(mesh: Mesh, options: Options, crew: Crew) -> _Order:
+    """That of the mesh where little is to be gained, else along a curve."""
     can_divide = options.blocked != "violate" and options.intersections == "allow"
     in_runs = options.has_one_threshold  # which is too quick for another order to pay, mostly
     in_lines = options.uses_quadrics
@@ -144,7 +145,7 @@ class Engine:
         self._scratch = start_scratch(m, n_coned, n_coned)
         self._scratch.tally[kernels.state.N_LIVE] = m
         self._desks = Desks(n_coned, keep_log=True)
-        if self._division is not None and not self.is_divided:
+        if self._division is not None and not self.is_divided:  # too little has to go
             self._unite()
 
     @property

@@ -12,6 +12,9 @@ By length goes first: its edge length leaves `--keep` per cent of the faces, and
 asked for the number that this gave. Each tool gets its input in the types that it takes; converting
 does not count. Surfaces are saved once, and the processes map the files into memory.
 
+Before each run free memory is written to once. On a virtual machine a program would else have to
+wait for what the one before it gave back, and most of all the first one that takes much.
+
 A tool whose run took longer than `--patience` seconds is not run again, nor on larger surfaces.
 """
 
@@ -66,6 +69,7 @@ PEERS = tuple(tool for tool in TOOLS if "DecimatePro" not in tool.name)
 WARM_UP = 100_000  # faces, more than it takes to divide a surface for threads
 TO_TUNE = 50_000  # faces of the gyroid that the edge length is found on
 HANGS = 20  # times the patience: a process is given up
+BYTES_A_FACE = 400  # what a tool takes, about
 UNITS = {"k": 10**3, "M": 10**6}
 
 
@@ -194,6 +198,11 @@ class Cases:
         return folder, len(mesh.faces), length
 
 
+def touch_free_memory(n_bytes: int) -> None:
+    """Write to so much memory that is free, and let it go."""
+    np.empty(n_bytes, np.uint8).fill(1)
+
+
 def measure(
     folder: Path, length: float, workers: list[Worker], arguments: argparse.Namespace
 ) -> dict[str, Any]:
@@ -201,10 +210,12 @@ def measure(
     console = Console(stderr=True)
     goal: dict[str, Any] = {"max_edge_length": length}
     tools: dict[str, Any] = {}
+    n_faces = len(np.load(folder / "faces.npy", mmap_mode="r"))
     for repeat in range(arguments.repeats):
         for worker in workers:
             if worker.is_out:
                 continue
+            touch_free_memory(BYTES_A_FACE * n_faces)
             answer = worker.run(folder, goal, arguments.patience)
             if answer is None:
                 console.print(f"{folder.name}: {worker.name}: {worker.is_out}")
