@@ -72,6 +72,7 @@ def contract(
     with clock.stage("report"):
         weights = engine.vertex_weights() if vertex_data else None
         result = engine.result
+        engine.let_go()
         examined = examine(result.faces.reshape(-1), len(result.vertices), threads=engine.n_threads)
     if mesh is not None and options.fits:
         with clock.stage("fit"):

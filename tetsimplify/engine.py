@@ -467,6 +467,12 @@ class Engine:
         stop = self._stop(reasons, longest)
         return Result(*mesh, vertex_map, face_map, number[edges], reasons, shortest, stop)
 
+    def let_go(self) -> None:
+        """Keep nothing but the result and the counters: what follows needs memory, too."""
+        self._scratch = start_scratch(0, 0, 0)._replace(tally=self._scratch.tally)
+        del self._surface, self._quadrics, self._cost, self._watch, self._desks
+        del self._arranged, self._cells, self._division, self._face_origin, self._room
+
     def vertex_errors(self) -> NDArray[np.float64]:
         """Root mean squared distances of the vertices of the result from the planes merged there.
 
