@@ -39,10 +39,10 @@ FEW_DEAD = 0.9  # of the faces are live: then no list is made of these
 
 
 class Cells(NamedTuple):
-    """The cells of the faces, in two ways."""
+    """The cells of the faces, in two ways. Those of the first are runs of 2**CELL_BITS faces."""
 
-    of_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
-    """Shapes (m,); IN_ORDER where cells are runs of 2**CELL_BITS faces as they are."""
+    shifted: NDArray[np.int32]
+    """Shape (m,): those of the second way; IN_ORDER where they are such runs, too."""
     n_curve: int
     """How many cells there are along a curve, where they are no runs."""
     least: int
@@ -90,7 +90,7 @@ def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
     crew.share(take, m, PART)
     n_shifted = int(kernels.order.number_cells(number))
     crew.share(renumber, m, PART)
-    return Cells((IN_ORDER, shifted), n_shifted, FACES, (FACES, FACES), AT_ONCE)
+    return Cells(shifted, n_shifted, FACES, (FACES, FACES), AT_ONCE)
 
 
 def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division, NDArray[np.int32]] | None:
@@ -101,7 +101,7 @@ def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division, NDArray[np.int32]] | 
     """
     m = len(mesh.faces)
     run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
-    cells = Cells((IN_ORDER, IN_ORDER), 0, run, (run, run // 2), 1)
+    cells = Cells(IN_ORDER, 0, run, (run, run // 2), 1)
     vertex_block = np.zeros(len(mesh.vertices), np.int32)
     division = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, IN_ORDER, crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
@@ -120,7 +120,7 @@ def copy_live(
     begin : ndarray, shape (n_parts + 1,), int64
         Where the live faces of each part of PART faces begin.
     """
-    in_order, shifted = cells.of_faces
+    shifted = cells.shifted
     if not len(shifted):
         return cells
     live = np.empty(begin[-1], np.int32)
@@ -130,7 +130,7 @@ def copy_live(
         kernels.blocks.copy_cells(corner_vertex, shifted, part.start, part.stop, at, live)
 
     crew.share(copy, len(corner_vertex) // 3, PART)
-    return cells._replace(of_faces=(in_order, live))
+    return cells._replace(shifted=live)
 
 
 def divide(
@@ -154,8 +154,8 @@ def divide(
         For a list of faces, where one is needed.
     crew : Crew
     """
-    of_faces, m = (cells.of_faces[way], CELL_BITS), len(corner_vertex) // 3
-    are_runs = not len(of_faces[0])
+    cell, m = cells.shifted if way else IN_ORDER, len(corner_vertex) // 3
+    of_faces, are_runs = (cell, CELL_BITS), not len(cell)
     n_cells = (m >> CELL_BITS) + 1 if are_runs else cells.n_curve
     n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
     block_of, first_cell = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)

@@ -115,11 +115,7 @@ def _fitted(
     progress: Progress | None,
 ) -> Result:
     """The result with its vertices moved nearer to the mesh given; those that are locked stay."""
-    options, crew, made = (
-        engine.options,
-        Crew(engine.n_threads),
-        Mesh(result.vertices, result.faces),
-    )
+    options, made = engine.options, Mesh(result.vertices, result.faces)
     if options.fit is not True and not pays(mesh, made):
         return result
     held = (examined.loop >= 0).astype(np.uint8)
@@ -132,7 +128,7 @@ def _fitted(
         cos_feature=None if options.feature_angle is None else cosine_of(options.feature_angle),
         progress=progress,
     )
-    shortest, _ = edge_extremes(Mesh(vertices, result.faces), crew)
+    shortest, _ = edge_extremes(Mesh(vertices, result.faces), Crew(engine.n_threads))
     return result._replace(vertices=vertices, shortest_edge=shortest)
 
 

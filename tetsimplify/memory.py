@@ -1,9 +1,11 @@
-"""Arrays in memory that is to be aligned, or hardly touched."""
+"""Memory that is to be aligned, hardly touched, or handed back."""
 
 from __future__ import annotations
 
+import ctypes
 import math
 import mmap
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,3 +32,14 @@ def sparse_zeros(*shape: int) -> NDArray[np.int32]:
     if size < LARGE:
         return np.zeros(shape, np.int32)
     return np.frombuffer(mmap.mmap(-1, size), np.int32).reshape(shape)
+
+
+def hand_back_memory() -> None:
+    """Let the system have what its allocator keeps of the memory of all the pieces.
+
+    That of Linux (glibc) keeps most of what threads have let go of, in case they want it again.
+    """
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim is not None:
+            trim(0)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-import sys
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
@@ -22,6 +20,7 @@ from tetsimplify.errors import OptionError
 from tetsimplify.isosurface import as_source
 from tetsimplify.levels import as_levels
 from tetsimplify.march import March, blocks
+from tetsimplify.memory import hand_back_memory
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.pieces import (
@@ -162,7 +161,7 @@ def extract_and_simplify(
             stream = _Stream(options, workers, progress)
             mesh = stream.run(march, middles)
         del march
-        _hand_back_memory()
+        hand_back_memory()
     with clock.stage("check"):
         locked = np.zeros(len(mesh.vertices), np.bool_)
         engine = Engine(mesh, options, locked, threads=threads)
@@ -178,17 +177,6 @@ def extract_and_simplify(
     )
     report = stream.told(whole.report)
     return SimplifiedIsosurface(whole.vertices, whole.faces, number, report)
-
-
-def _hand_back_memory() -> None:
-    """Let the system have what its allocator keeps of the memory of all the pieces.
-
-    That of Linux (glibc) keeps most of what threads have let go of, in case they want it again.
-    """
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
 
 
 def _as_options(**given: Any) -> Options:

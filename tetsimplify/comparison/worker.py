@@ -6,13 +6,11 @@ result. Where it ends without an answer, it has crashed.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import json
 import os
 import sys
 import time
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from tetsimplify.decimators import Goal, Method
+from tetsimplify.memory import hand_back_memory
 from tetsimplify.mesh import Mesh
 from tetsimplify.standard import as_result
 
@@ -79,19 +78,12 @@ def _start_watching_memory() -> int | None:
     gc.collect()
     if not STATUS.exists():
         return None
-    _give_back_memory()
+    hand_back_memory()  # what is free in the heap would hide as much of what is taken next
     try:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:
         return None
     return _memory("VmRSS:")
-
-
-def _give_back_memory() -> None:
-    """What is free in the heap would hide as much of what is taken next."""
-    trim: Callable[[int], int] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
 
 
 def _memory(key: str) -> int:

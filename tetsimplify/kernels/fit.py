@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import behind, face_of, others
+from tetsimplify.kernels.geometry import edge_vector
 from tetsimplify.kernels.jit import kernel_in_place, part
 
 TINY = 1e-300  # in place of zero as a divisor
@@ -209,16 +210,8 @@ def solve(places, corner_vertex, links, sums, held, solver, first, last, before,
             count += of_face[COUNT]
             if of_face[COUNT] > 0.0:
                 exactest = min(exactest, np.float64(of_face[R2]) / of_face[COUNT])
-            ux, uy, uz = (
-                places[p, 0] - places[v, 0],
-                places[p, 1] - places[v, 1],
-                places[p, 2] - places[v, 2],
-            )
-            wx, wy, wz = (
-                places[q, 0] - places[v, 0],
-                places[q, 1] - places[v, 1],
-                places[q, 2] - places[v, 2],
-            )
+            ux, uy, uz = edge_vector(places, v, p)
+            wx, wy, wz = edge_vector(places, v, q)
             mx += ux + wx
             my += uy + wy
             mz += uz + wz

@@ -1,6 +1,16 @@
-"""Lengths."""
+"""Edges as vectors, and their lengths."""
 
 from tetsimplify.kernels.jit import part
+
+
+@part
+def edge_vector(vertices, a, b):
+    """The edge from a to b."""
+    return (
+        vertices[b, 0] - vertices[a, 0],
+        vertices[b, 1] - vertices[a, 1],
+        vertices[b, 2] - vertices[a, 2],
+    )
 
 
 @part

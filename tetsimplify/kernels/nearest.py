@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.bvh import STACK_SIZE, WIDTH, Tree
+from tetsimplify.kernels.geometry import edge_vector
 from tetsimplify.kernels.jit import cold_part, part
 
 RESOLUTION = 1e-13  # smaller distances are made of rounding errors: they count as none
@@ -224,7 +225,5 @@ def distance2_to_sliver(vertices, a, b, c, x, y, z):
 @part
 def edge(vertices, a, b):
     """The vector from a to b, and its squared length."""
-    x = vertices[b, 0] - vertices[a, 0]
-    y = vertices[b, 1] - vertices[a, 1]
-    z = vertices[b, 2] - vertices[a, 2]
+    x, y, z = edge_vector(vertices, a, b)
     return x, y, z, x * x + y * y + z * z

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, face_of, others
+from tetsimplify.kernels.geometry import edge_vector
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.prefetch import prefetch_row
 
@@ -62,16 +63,8 @@ class Samples(NamedTuple):
 @part
 def _cross(vertices, a, b, c):
     """The cross product of the edges ab and ac."""
-    ux, uy, uz = (
-        vertices[b, 0] - vertices[a, 0],
-        vertices[b, 1] - vertices[a, 1],
-        vertices[b, 2] - vertices[a, 2],
-    )
-    wx, wy, wz = (
-        vertices[c, 0] - vertices[a, 0],
-        vertices[c, 1] - vertices[a, 1],
-        vertices[c, 2] - vertices[a, 2],
-    )
+    ux, uy, uz = edge_vector(vertices, a, b)
+    wx, wy, wz = edge_vector(vertices, a, c)
     return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
 
 
@@ -157,16 +150,8 @@ def _fill_lane(places, corner_vertex, corner, normals, stars, i):
     v = corner_vertex[corner]
     p, q = others(corner_vertex, corner)
     f = face_of(corner)
-    ux, uy, uz = (
-        places[p, 0] - places[v, 0],
-        places[p, 1] - places[v, 1],
-        places[p, 2] - places[v, 2],
-    )
-    wx, wy, wz = (
-        places[q, 0] - places[v, 0],
-        places[q, 1] - places[v, 1],
-        places[q, 2] - places[v, 2],
-    )
+    ux, uy, uz = edge_vector(places, v, p)
+    wx, wy, wz = edge_vector(places, v, q)
     uu, ww = ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz
     twice = 2.0 * normals[f, 3]
     if not twice * twice > FLAT_CORNER * uu * ww:
