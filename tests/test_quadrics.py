@@ -90,10 +90,18 @@ def tube(n_around=48, n_along=24):
 # --- the quadrics themselves ----------------------------------------------------------------------
 
 
+def zero_quadrics(n):
+    """Quadrics that stand for no planes."""
+    quadrics = new_quadrics(n)
+    quadrics.matrix[:] = quadrics.origin[:] = 0.0
+    return quadrics
+
+
 def quadrics_of(vertices, faces):
     mesh = as_mesh(vertices, faces)
     n = len(mesh.vertices)
     quadrics = new_quadrics(n)
+    quadrics.matrix[:] = quadrics.origin[:] = np.nan  # all of it is to be filled
     corner_vertex = mesh.faces.reshape(-1)
     first_corner, next_corner, _ = kernels.corners.link_corners(corner_vertex, n)
     links = corner_vertex, next_corner, first_corner
@@ -131,7 +139,7 @@ def test_the_optimum_is_where_the_planes_meet():
     for offset in (0.0, 1e6):
         corner = np.array([0.3, -0.2, 0.7])
         vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]) + offset
-        quadrics = new_quadrics(2)
+        quadrics = zero_quadrics(2)
         for axis in range(3):
             quadrics.matrix[0, (0, 3, 5)[axis]] += 1.0
             quadrics.linear[0, LINEAR + axis] -= corner[axis]
@@ -143,7 +151,7 @@ def test_the_optimum_is_where_the_planes_meet():
 
 def test_the_optimum_is_the_middle_where_the_planes_do_not_decide():
     """One plane: the middle of the edge, dropped on the plane. None: no place is told."""
-    quadrics = new_quadrics(2)
+    quadrics = zero_quadrics(2)
     vertices = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 0.0]])
     q = kernels.quadrics.sum_at.py_func(quadrics, vertices, 0, 1)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -13,6 +13,7 @@ from tetsimplify.errors import (
 from tetsimplify.interfaces import Interfaces, extract_interfaces
 from tetsimplify.intersections import IntersectionReport, self_intersections
 from tetsimplify.isosurface import Isosurface, extract_isosurface
+from tetsimplify.memory import hand_back_memory
 from tetsimplify.mesh import Mesh
 from tetsimplify.quality import QualityReport, quality
 from tetsimplify.repair import repair
@@ -46,6 +47,7 @@ __all__ = [
     "extract_and_simplify",
     "extract_interfaces",
     "extract_isosurface",
+    "hand_back_memory",
     "quality",
     "repair",
     "self_intersections",

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
 from tetsimplify.locality import IN_ORDER, Arrangement
 from tetsimplify.mesh import Mesh
@@ -74,7 +74,7 @@ def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
     bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / 2**CELL_BITS))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large
     curve = low - SHIFT * extent, scale, 2**bits - 1
-    of_vertices, shifted = np.empty(n, np.int32), np.empty(m, np.int32)
+    of_vertices, shifted = memory.empty(n, np.int32), memory.empty(m, np.int32)
     number = np.zeros(2 ** (3 * bits), np.int32)
 
     def find(part: slice) -> None:
@@ -102,7 +102,7 @@ def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division, NDArray[np.int32]] | 
     m = len(mesh.faces)
     run = max(RUN, min(m // N_RUNS, LONGEST_RUN))
     cells = Cells(IN_ORDER, 0, run, (run, run // 2), 1)
-    vertex_block = np.zeros(len(mesh.vertices), np.int32)
+    vertex_block = memory.full(len(mesh.vertices), 0, np.int32)
     division = divide(cells, 0, mesh.faces.reshape(-1), vertex_block, IN_ORDER, crew)
     n_shared = np.count_nonzero(vertex_block == kernels.blocks.SHARED)
     if n_shared > MOST_SHARED * len(vertex_block):
@@ -123,7 +123,7 @@ def copy_live(
     shifted = cells.shifted
     if not len(shifted):
         return cells
-    live = np.empty(begin[-1], np.int32)
+    live = memory.empty(int(begin[-1]), np.int32)
 
     def copy(part: slice) -> None:
         at = begin[part.start // PART]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import blocks, kernels
+from tetsimplify import blocks, kernels, memory
 from tetsimplify.crew import Crew
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ def compact(
 
     begin = np.cumsum([0, *crew.share(count, m, blocks.PART)], dtype=np.int64)
     n = int(begin[-1])
-    live_cost = None if cost is None else np.empty(kernels.cost.COLUMNS * n, np.float32)
-    place, origin = np.empty(m, np.int32), np.empty(n, np.int32)
+    live_cost = None if cost is None else memory.empty(kernels.cost.COLUMNS * n, np.float32)
+    place, origin = memory.empty(m, np.int32), memory.empty(n, np.int32)
     live = surface._replace(
-        corner_vertex=np.empty(3 * n, np.int32),
-        next_corner=np.empty(3 * n if linked else 0, np.int32),
-        face_state=np.empty(n, np.uint8),
-        verdict=np.empty(3 * n, np.uint8),
+        corner_vertex=memory.empty(3 * n, np.int32),
+        next_corner=memory.empty(3 * n if linked else 0, np.int32),
+        face_state=memory.empty(n, np.uint8),
+        verdict=memory.empty(3 * n, np.uint8),
     )
     crew.share(copy, m, blocks.PART)
     if linked:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import blocks, kernels
+from tetsimplify import blocks, kernels, memory
 from tetsimplify.compaction import compact
 from tetsimplify.crew import Crew
 from tetsimplify.data import VertexWeights
@@ -128,8 +128,8 @@ class Engine:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
             self._quadrics = start_quadrics(start, options, arranged_bound, self._crew)
         self._cost = None
-        if not options.has_one_threshold:  # none up to date: 0 is below every threshold
-            self._cost = np.zeros(kernels.cost.COLUMNS * m, np.float32)
+        if not options.has_one_threshold:  # to be ranked first
+            self._cost = memory.empty(kernels.cost.COLUMNS * m, np.float32)
         self._colour = kernels.state.MOVED_EVEN
         self._face_origin = self._arranged.face_origin
         self._room = np.empty(0, np.int32)  # for the faces of blocks
@@ -371,7 +371,7 @@ class Engine:
         surface, division, self._division = self._surface, self._division, None
         if division is None or self.n_sweeps > 0:
             if len(self._room) < self._n_rows:
-                self._room = np.empty(self._n_rows, np.int32)
+                self._room = memory.empty(self._n_rows, np.int32)
             division = blocks.divide(
                 *(self._cells, self.n_sweeps % 2, surface.corner_vertex, surface.vertex_block),
                 *(self._room, self._crew),

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
-from tetsimplify.memory import cache_lines
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress
 
@@ -163,11 +162,11 @@ class _Fit:
         low, high = kernels.order.bounds(made.vertices)
         # a power of two: so a mesh twice as large gives the same
         self._frame = low + 0.5 * (high - low), 2.0 ** -math.frexp(size)[1]
-        self._places = np.empty((n, 3))
-        self._normals = np.empty((m, 4))
+        self._places = memory.empty((n, 3))
+        self._normals = memory.empty((m, 4))
         self._first_normals: Array | None = None
-        self._steps, self._steps_before = np.empty((n, 3)), np.zeros((n, 3))
-        self._sums = cache_lines(m).view(np.float32)
+        self._steps, self._steps_before = memory.empty((n, 3)), memory.empty((n, 3))
+        self._sums = memory.cache_lines(m).view(np.float32)
         self._samples: Samples | None = None
         self._desks: SimpleQueue[Desk] = SimpleQueue()
 
@@ -193,7 +192,7 @@ class _Fit:
         begin = np.cumsum([0, *self._crew.share(count, n, VERTICES)])
         Crew(self._crew.n_threads).share(give, n, VERTICES)
         first[n] = begin[-1]
-        lanes = np.empty((int(begin[-1]), kernel.N_ROWS, kernel.LANES), np.float32)
+        lanes = memory.empty((int(begin[-1]), kernel.N_ROWS, kernel.LANES), np.float32)
         stars: Stars = kernel.Stars(
             first, lanes, lanes.view(np.int32), lanes.reshape(-1, kernel.LANES)
         )
@@ -204,7 +203,7 @@ class _Fit:
         if self._first_normals is None:
             self._first_normals = self._normals
         elif self._first_normals is self._normals:
-            self._normals = np.empty_like(self._normals)
+            self._normals = memory.empty(self._normals.shape)
 
         def find_normals(part: slice) -> None:
             kernels.samples.find_normals(
@@ -326,7 +325,9 @@ class _Fit:
 
 
 def _new_samples(n: int) -> Samples:
-    samples: Samples = kernels.samples.Samples(np.empty(n, np.int32), np.empty((n, 3), np.float32))
+    samples: Samples = kernels.samples.Samples(
+        memory.empty(n, np.int32), memory.empty((n, 3), np.float32)
+    )
     return samples
 
 

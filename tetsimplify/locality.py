@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
-from tetsimplify.memory import cache_lines
 from tetsimplify.mesh import Mesh
 
 IN_ORDER = np.empty(0, np.int32)  # a list of numbers that are all there in order
@@ -41,17 +40,18 @@ class Arrangement(NamedTuple):
 def as_given(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangement:
     """The order of the mesh itself; its arrays are copied, its vertices to lines of a cache."""
     n, m = len(mesh.vertices), len(mesh.faces)
-    vertices, faces = _room(n, in_lines), np.empty((m, 3), np.int32)
+    vertices, faces = _room(n, in_lines), memory.empty((m, 3), np.int32)
+    numbers = memory.empty(n, np.int32)
 
     def copy_vertices(part: slice) -> None:
         vertices[part, :3] = mesh.vertices[part]
+        numbers[part] = np.arange(part.start, part.stop)
 
     def copy_faces(part: slice) -> None:
         faces[part] = mesh.faces[part]
 
     crew.share(copy_vertices, n, PART)
     crew.share(copy_faces, m, PART)
-    numbers = np.arange(n, dtype=np.int32)
     return Arrangement(vertices, faces, numbers, numbers, IN_ORDER)
 
 
@@ -63,9 +63,9 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
     """
     n, m = len(mesh.vertices), len(mesh.faces)
     coded = _sorted_along_curve(mesh.vertices, crew)
-    vertex_origin, vertex_place = np.empty(n, np.int32), np.empty(n, np.int32)
-    face_origin = np.empty(m, np.int32)
-    vertices, faces = _room(n, in_lines), np.empty((m, 3), np.int32)
+    vertex_origin, vertex_place = memory.empty(n, np.int32), memory.empty(n, np.int32)
+    face_origin = memory.empty(m, np.int32)
+    vertices, faces = _room(n, in_lines), memory.empty((m, 3), np.int32)
     shift = max(0, n.bit_length() - GROUP_BITS)
 
     def number(part: slice) -> None:
@@ -93,7 +93,7 @@ def _sorted_along_curve(vertices: NDArray[np.float64], crew: Crew) -> NDArray[np
     low, high = kernels.order.bounds(vertices)
     extent = float((high - low).max())
     scale = kernels.order.N_CELLS / extent if extent > 0.0 else 0.0
-    given, sorted_once = np.empty(len(vertices), np.int64), np.empty(len(vertices), np.int64)
+    given, sorted_once = memory.empty((2, len(vertices)), np.int64)
 
     def find(part: slice) -> None:
         kernels.order.find_codes(vertices, low, scale, part.start, part.stop, given)
@@ -144,4 +144,4 @@ def _sort(
 
 def _room(n_vertices: int, in_lines: bool) -> NDArray[np.float64]:
     """Room for positions."""
-    return cache_lines(n_vertices) if in_lines else np.empty((n_vertices, 3))
+    return memory.cache_lines(n_vertices) if in_lines else memory.empty((n_vertices, 3))

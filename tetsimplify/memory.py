@@ -1,4 +1,10 @@
-"""Memory that is to be aligned, hardly touched, or handed back."""
+"""Memory that is kept for later, aligned, hardly touched, or handed back.
+
+Memory that is new to a process has to be cleared by the system first, page by page, and on a
+virtual machine to be had from its host before that. A run would wait for this again and again: it
+needs a few large arrays for a short time. So what they took is kept for the next ones. The system
+is told that nothing is in it any more, and takes it when it runs short.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +12,75 @@ import ctypes
 import math
 import mmap
 import sys
+import weakref
+from collections import deque
+from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 LINE = 64  # bytes of a line of a cache
-LARGE = 2**20  # bytes: arrays for which it pays to ask for small pages
+LARGE = 2**20  # bytes: smaller arrays are left to NumPy
+MOST_KEPT = 2**30  # bytes
+STEPS = 4  # sizes that are kept apart, from one power of two to the next
+FITS = 2  # times the size that is asked for: larger blocks are left for larger arrays
+CAN_KEEP = hasattr(mmap, "MADV_FREE")
+
+_kept: dict[int, deque[mmap.mmap]] = {}  # by size; what is done with it at once needs no lock
+
+
+def empty(shape: int | tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray:
+    """An array that is not filled, as of NumPy. Its memory is kept when nothing refers to it."""
+    shape = shape if isinstance(shape, tuple) else (shape,)
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE or not CAN_KEEP:
+        return np.empty(shape, dtype)
+    block = _take(size)
+    array: NDArray = np.ndarray(shape, dtype, block)
+    weakref.finalize(array, _keep, block).atexit = False
+    return array
+
+
+def full(shape: int | tuple[int, ...], value: float, dtype: DTypeLike) -> NDArray:
+    """The same, filled."""
+    array = empty(shape, dtype)
+    array.fill(value)
+    return array
+
+
+def _take(size: int) -> mmap.mmap:
+    """A block of memory that is kept, the smallest one that is large enough, or a new one."""
+    step = 2 ** (size.bit_length() - 1) // STEPS
+    needed = -(-size // step) * step
+    for kept in sorted(_kept):
+        if needed <= kept <= FITS * size:
+            with suppress(IndexError):  # there is none, or another thread was faster
+                return _kept[kept].pop()
+    return _mapped(needed, "MADV_HUGEPAGE")
+
+
+def _mapped(size: int, advice: str) -> mmap.mmap:
+    """New memory of this process alone, all zero, in pages as advised."""
+    if not hasattr(mmap, "MAP_PRIVATE"):
+        return mmap.mmap(-1, size)
+    block = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    with suppress(AttributeError, OSError):  # of a system that knows no such advice
+        block.madvise(getattr(mmap, advice))
+    return block
+
+
+def _keep(block: mmap.mmap) -> None:
+    """Keep a block that nothing refers to, for later."""
+    if sum(size * len(blocks) for size, blocks in list(_kept.items())) + len(block) <= MOST_KEPT:
+        with suppress(OSError):  # where the system cannot take it back, it is not kept
+            block.madvise(mmap.MADV_FREE)
+            _kept.setdefault(len(block), deque()).append(block)
 
 
 def cache_lines(n: int) -> NDArray[np.float64]:
-    """So many lines of a cache, all zero, shape (n, 8)."""
+    """So many lines of a cache, not filled, shape (n, 8)."""
     width = LINE // 8
-    memory = np.zeros((n + 1) * width)
+    memory = empty((n + 1) * width)
     first = -(memory.ctypes.data // 8) % width
     return memory[first : first + n * width].reshape(n, width)
 
@@ -31,14 +94,22 @@ def sparse_zeros(*shape: int) -> NDArray[np.int32]:
     size = 4 * math.prod(shape)
     if size < LARGE:
         return np.zeros(shape, np.int32)
-    return np.frombuffer(mmap.mmap(-1, size), np.int32).reshape(shape)
+    return np.frombuffer(_mapped(size, "MADV_NOHUGEPAGE"), np.int32).reshape(shape)
 
 
 def hand_back_memory() -> None:
-    """Let the system have what its allocator keeps of the memory of all the pieces.
+    """Let the system have the memory that is kept for the next call, here and by its allocator.
 
-    That of Linux (glibc) keeps most of what threads have let go of, in case they want it again.
+    tetsimplify keeps up to 1 GiB of what it worked with, so that the next call need not wait for
+    new memory. On Linux and macOS the system takes that anyway when it runs short; elsewhere none
+    is kept. The allocator of Linux (glibc) keeps most of what threads have let go of.
+
+    Examples
+    --------
+    >>> import tetsimplify
+    >>> tetsimplify.hand_back_memory()
     """
+    _kept.clear()
     if sys.platform == "linux":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import kernels, memory
 from tetsimplify.blocks import PART
 from tetsimplify.crew import Crew
 from tetsimplify.locality import Arrangement
@@ -68,7 +68,7 @@ def _new_numbers(surface: Surface, arranged: Arrangement, crew: Crew) -> tuple[I
     """The number of each vertex, -1 where it is gone, and how many are left."""
     visit = arranged.vertex_place
     n = len(visit)
-    is_used, number = np.zeros(n, np.uint8), np.empty(n, np.int32)
+    is_used, number = memory.full(n, 0, np.uint8), memory.empty(n, np.int32)
 
     def mark(part: slice) -> None:
         corners = surface.corner_vertex[3 * part.start : 3 * part.stop]
@@ -93,7 +93,7 @@ def _faces_given(
     if arranged.is_as_given:
         return surface.corner_vertex.reshape(-1, 3), face_origin
     n, m = len(face_origin), len(arranged.face_origin)
-    place = np.empty(m, np.int32)
+    place = memory.empty(m, np.int32)
     faces, face_map = np.empty((n, 3), np.int32), np.empty(n, np.int32)
 
     def clear(part: slice) -> None:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import kernels
+from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
 from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
-from tetsimplify.memory import cache_lines, sparse_zeros
+from tetsimplify.memory import sparse_zeros
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options
 from tetsimplify.topology import TopologyReport, examine, topology
@@ -80,7 +80,7 @@ def start_surface(
     report = dataclasses.replace(report, unreferenced_vertices=unused)
 
     on_loops = np.flatnonzero(loop >= 0)
-    held = np.zeros(n, np.uint8)
+    held = memory.full(n, 0, np.uint8)
     if locked.any():
         held[:] = locked[arranged.vertex_origin]
     if options.boundary != "simplify":
@@ -91,15 +91,15 @@ def start_surface(
         vertices=vertices,
         corner_vertex=corner_vertex,
         next_corner=next_corner,
-        face_state=np.full(m, kernels.state.STALE_ODD, np.uint8),
-        verdict=np.zeros(3 * m, np.uint8),
-        vertex_block=np.zeros(n, np.int32) if vertex_block is None else vertex_block,
+        face_state=memory.full(m, kernels.state.STALE_ODD, np.uint8),
+        verdict=memory.full(3 * m, 0, np.uint8),
+        vertex_block=memory.full(n, 0, np.int32) if vertex_block is None else vertex_block,
         merged_into=np.arange(n, dtype=np.int32),
         loop=loop,
         loop_size=np.zeros(n_loops, np.int32),
         loop_home=np.zeros(n_loops, np.int32),
         locked=held,
-        merges=np.empty((n, 2)),
+        merges=memory.empty((n, 2)),
     )
     kernels.loops.count_loop_edges(on_loops, loop, surface.loop_size)
     return Start(surface, report, first_corner, on_loops)
@@ -178,15 +178,15 @@ def _weight_unit(surface: Surface) -> float:
 
 
 def new_quadrics(n_vertices: int, vertices: NDArray[np.float64] | None = None) -> Quadrics:
-    """Quadrics of so many vertices, all zero.
+    """Quadrics of so many vertices, not filled.
 
     Parameters
     ----------
     vertices : ndarray, shape (n, 8), float64, optional
         Lines of a cache that begin with the positions.
     """
-    matrix = cache_lines(n_vertices)
-    places = cache_lines(n_vertices) if vertices is None else vertices
+    matrix = memory.cache_lines(n_vertices)
+    places = memory.cache_lines(n_vertices) if vertices is None else vertices
     quadrics: Quadrics = kernels.quadrics.Quadrics(
         matrix=matrix, linear=matrix.view(np.float32), origin=places.view(np.float32)
     )
@@ -199,7 +199,7 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     room = 3 * state.AT_ONCE + state.LANES + kernels.cost.AHEAD  # for the edges PENDING
     scratch: Scratch = state.Scratch(
         tally=np.zeros(state.TALLY_SIZE, np.int64),
-        mark=np.zeros(n_coned, np.int32),
+        mark=memory.full(n_coned, 0, np.int32),
         face_mark=sparse_zeros(n_faces),
         nodes=sparse_zeros(3, n_nodes),
         lists=sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tetsimplify import adapters, kernels
+from tetsimplify import adapters, kernels, memory
 from tetsimplify.arrays import as_mesh, listed
 from tetsimplify.crew import Crew
 from tetsimplify.errors import OptionError
@@ -169,15 +169,15 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
     """
     crew = Crew(threads)
     n_threads = crew.n_threads if len(corner_vertex) > 3 * LEAST_FACES else 1
-    numbers = [np.empty(n_vertices, np.int32) for _ in range(5)]
+    numbers = [memory.empty(n_vertices, np.int32) for _ in range(5)]
     first_corner, component, euler, loop, lower = numbers
     found = kernels.surface.Survey(
         first_corner=first_corner,
-        next_corner=np.empty(len(corner_vertex), np.int32),
+        next_corner=memory.empty(len(corner_vertex), np.int32),
         component=component,
         euler=euler,
         loop=loop,
-        left=np.empty(n_vertices, np.uint8),
+        left=memory.empty(n_vertices, np.uint8),
         lower=lower,
     )
 
@@ -197,7 +197,7 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
     defects = kernels.defects.none()
     if n_left:
         rest = np.flatnonzero(found.left != kernels.surface.SETTLED).astype(np.int32)
-        arcs, slot = np.empty((4, longest + 1), np.int32), np.empty(n_vertices, np.int32)
+        arcs, slot = np.empty((4, longest + 1), np.int32), memory.empty(n_vertices, np.int32)
         n_more, n_boundary, n_degenerate, n_irregular = kernels.surface.survey_rest(
             corner_vertex, found, rest, arcs, slot
         )

@@ -249,7 +249,10 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
         Which vertices.
     """
     for v in range(first, last):
+        matrix, origin = quadrics.matrix[v], quadrics.origin[v]
         if first_corner[v] < 0:
+            matrix[:] = 0.0
+            origin[NORMAL : AREA + 1] = 0.0
             continue
         xx = xy = xz = yy = yz = zz = 0.0
         sum_x = sum_y = sum_z = sum_area = 0.0
@@ -265,9 +268,9 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
             c = next_corner[c]
             if c == first_corner[v]:
                 break
-        matrix, origin = quadrics.matrix[v], quadrics.origin[v]
         matrix[0], matrix[1], matrix[2] = xx / unit, xy / unit, xz / unit
         matrix[3], matrix[4], matrix[5] = yy / unit, yz / unit, zz / unit
+        matrix[6] = matrix[7] = 0.0  # b and c
         origin[NORMAL], origin[NORMAL + 1] = sum_x / unit, sum_y / unit
         origin[NORMAL + 2], origin[AREA] = sum_z / unit, sum_area / unit
 
