@@ -69,7 +69,8 @@ def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
     """
     vertices, faces = arranged.vertices, arranged.faces
     n, m = len(vertices), len(faces)
-    low, high = kernels.order.bounds(vertices)
+    assert arranged.box is not None
+    low, high = arranged.box
     extent = float((high - low).max())
     bits = min(2 + math.ceil(0.5 * math.log2(max(1.0, m / 2**CELL_BITS))), MOST_BITS)
     scale = 2.0 ** (bits - 1) / extent if extent > 0.0 else 0.0  # of a cube twice as large

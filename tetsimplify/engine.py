@@ -126,7 +126,9 @@ class Engine:
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics = start_quadrics(start, options, arranged_bound, self._crew)
+            self._quadrics, self._area = start_quadrics(
+                start, options, arranged_bound, self._crew
+            )
         self._cost = None
         if not options.has_one_threshold:  # to be ranked first
             self._cost = memory.empty(kernels.cost.COLUMNS * m, np.float32)
@@ -257,12 +259,17 @@ class Engine:
 
     def rank(self) -> None:
         """Bring the costs of the edges up to date."""
-        bundles = self._surface, self._quadrics, self.rules, self._cost
+        self._rank(1, blocks.PART)
+
+    def _rank(self, step: int, at_once: int) -> None:
+        """Bring the costs of every so many-th face up to date, some of them in a task."""
+        bundles, n_faces = (self._surface, self._quadrics, self.rules, self._cost), self._n_rows
 
         def task(part: slice) -> None:
-            kernels.cost.rank(*bundles, start_scratch(0, 0, 0), part.start, part.stop, 1)
+            last = min(part.stop * step, n_faces)
+            kernels.cost.rank(*bundles, start_scratch(0, 0, 0), part.start * step, last, step)
 
-        self._crew.share(task, self._n_rows, blocks.PART)
+        self._crew.share(task, -(-n_faces // step), at_once)
 
     def sweep_ranked(
         self,
@@ -336,20 +343,19 @@ class Engine:
 
     def negligible_cost(self) -> float:
         """A cost below which edges need no order: flat parts would take many sweeps otherwise."""
-        low, high = kernels.order.bounds(self._surface.vertices)
+        box = self._arranged.box
+        low, high = kernels.order.bounds(self._surface.vertices) if box is None else box
         nothing2 = NOTHING**2 * float(((high - low) ** 2).sum()) if self.n_faces else 0.0
         if self._quadrics is None or self.rules.by_length:
             return nothing2
-        areas = self._quadrics.origin[:, kernels.quadrics.AREA]  # every one three times
-        return nothing2 * float(areas.sum()) / (3 * max(1, self.n_faces))
+        return nothing2 * self._area / max(1, self.n_faces)
 
     def sample_of_costs(self) -> NDArray[np.float32]:
         """Costs of some of the edges that may be contracted, ascending."""
         assert self._cost is not None
         n_faces = self._n_rows
         step = max(1, n_faces // SAMPLE)
-        bundles = self._surface, self._quadrics, self.rules, self._cost
-        kernels.cost.rank(*bundles, self._scratch, 0, n_faces, step)
+        self._rank(step, blocks.PART // step)
         is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
         costs = self._cost.reshape(-1, kernels.cost.COLUMNS)[::step, :3][is_ranked]
         return np.sort(costs[costs < np.inf])
@@ -392,9 +398,8 @@ class Engine:
 
     def _vertices_on_loops(self) -> NDArray[np.intp]:
         """The boundary vertices that are left."""
-        kernels.loops.follow_merges(self._surface.merged_into, self._on_loops)
-        self._on_loops = np.unique(self._on_loops)
-        self._on_loops = self._on_loops[self._on_loops >= 0]
+        n = kernels.loops.follow_merges(self._surface.merged_into, self._on_loops)
+        self._on_loops = self._on_loops[:n]
         return self._on_loops
 
     def _share(

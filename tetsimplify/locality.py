@@ -30,6 +30,8 @@ class Arrangement(NamedTuple):
     """Shape (n,): the inverse."""
     face_origin: NDArray[np.int32]
     """Shape (m,): number of each face in the mesh given; IN_ORDER where it is the same."""
+    box: NDArray[np.float64] | None = None
+    """Shape (2, 3): the least and the largest coordinates, where they are known."""
 
     @property
     def is_as_given(self) -> bool:
@@ -62,7 +64,8 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
     common with other runs.
     """
     n, m = len(mesh.vertices), len(mesh.faces)
-    coded = _sorted_along_curve(mesh.vertices, crew)
+    box = kernels.order.bounds(mesh.vertices)
+    coded = _sorted_along_curve(mesh.vertices, box, crew)
     vertex_origin, vertex_place = memory.empty(n, np.int32), memory.empty(n, np.int32)
     face_origin = memory.empty(m, np.int32)
     vertices, faces = _room(n, in_lines), memory.empty((m, 3), np.int32)
@@ -85,12 +88,14 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
 
     crew.share(number, n, PART)
     _sort(count, sort, m, 2**GROUP_BITS, crew)
-    return Arrangement(vertices, faces, vertex_origin, vertex_place, face_origin)
+    return Arrangement(vertices, faces, vertex_origin, vertex_place, face_origin, box)
 
 
-def _sorted_along_curve(vertices: NDArray[np.float64], crew: Crew) -> NDArray[np.int64]:
+def _sorted_along_curve(
+    vertices: NDArray[np.float64], box: NDArray[np.float64], crew: Crew
+) -> NDArray[np.int64]:
     """Vertices along a Z-order curve, and in a cell by number; coded as of `find_codes`."""
-    low, high = kernels.order.bounds(vertices)
+    low, high = box
     extent = float((high - low).max())
     scale = kernels.order.N_CELLS / extent if extent > 0.0 else 0.0
     given, sorted_once = memory.empty((2, len(vertices)), np.int64)

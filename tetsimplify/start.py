@@ -132,10 +132,10 @@ def start_quadrics(
     options: Options,
     bound: NDArray[np.float64] | None,
     crew: Crew,
-) -> Quadrics:
+) -> tuple[Quadrics, float]:
     """The quadrics of all faces, and of boundary and feature edges, beside the positions.
 
-    See kernels/quadrics.py.
+    See kernels/quadrics.py. With the area of all faces, in the unit of their weights.
 
     Parameters
     ----------
@@ -152,22 +152,23 @@ def start_quadrics(
     quadrics = new_quadrics(n, surface.vertices)
     unit = _weight_unit(surface)
 
-    def sum_faces(part: slice) -> None:
+    def sum_faces(part: slice) -> float:
         largest = limit if bound is None else bound[part]
         quadrics.origin[part, kernels.quadrics.MAX_ERROR2] = largest * np.abs(largest)
-        kernels.quadrics.sum_faces(
+        area: float = kernels.quadrics.sum_faces(
             *(surface.vertices, surface.corner_vertex, surface.next_corner, first_corner),
             *(unit, part.start, part.stop, quadrics),
         )
+        return area
 
-    crew.share(sum_faces, n, AT_ONCE)
+    area = sum(crew.share(sum_faces, n, AT_ONCE)) / 3.0  # of each face at every corner
     sharp = -1.0
     if options.feature_angle is not None:
         sharp = math.cos(math.radians(options.feature_angle))
     begins = on_loops if sharp == -1.0 else np.arange(n)
     weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
     kernels.quadrics.add_creases(surface, first_corner, begins, quadrics.matrix, *weights, sharp)
-    return quadrics
+    return quadrics, area
 
 
 def _weight_unit(surface: Surface) -> float:

@@ -4,16 +4,27 @@ from tetsimplify.kernels.blocks import SHARED
 from tetsimplify.kernels.jit import kernel_in_place
 
 UNSEEN = -2  # no vertex of the loop yet
+MET = -2  # in place of the vertex itself
 
 
 @kernel_in_place
 def follow_merges(merged_into, on_loops):
-    """Replace boundary vertices by what they were merged into, -1 where that was removed."""
+    """Replace boundary vertices by what they were merged into, each once; return how many.
+
+    What was removed is left out. A vertex that has been met is marked in `merged_into` meanwhile.
+    """
+    n = 0
     for i in range(on_loops.size):
         v = on_loops[i]
         while v >= 0 and merged_into[v] != v:
-            v = merged_into[v]
-        on_loops[i] = v
+            v = merged_into[v]  # MET for one that was met
+        if v >= 0:
+            on_loops[n] = v
+            merged_into[v] = MET
+            n += 1
+    for i in range(n):
+        merged_into[on_loops[i]] = on_loops[i]
+    return n
 
 
 @kernel_in_place

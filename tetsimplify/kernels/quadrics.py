@@ -247,7 +247,13 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
         Of the weights: areas are counted in it.
     first, last : int
         Which vertices.
+
+    Returns
+    -------
+    float
+        Sum of the areas around all these vertices.
     """
+    total = 0.0
     for v in range(first, last):
         matrix, origin = quadrics.matrix[v], quadrics.origin[v]
         if first_corner[v] < 0:
@@ -273,6 +279,8 @@ def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, l
         matrix[6] = matrix[7] = 0.0  # b and c
         origin[NORMAL], origin[NORMAL + 1] = sum_x / unit, sum_y / unit
         origin[NORMAL + 2], origin[AREA] = sum_z / unit, sum_area / unit
+        total += sum_area / unit
+    return total
 
 
 @kernel_in_place

@@ -38,21 +38,26 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
     to_cost, to_origin
         The same.
     """
-    n = begin
-    for f in range(first, last):
-        is_live = surface.corner_vertex[3 * f] != DEAD
-        place[f] = n if is_live else -1
+    n, one = np.uint32(begin), np.uint32(1)
+    for face in range(first, last):
+        f = np.uint32(face)
+        corner, to_corner = np.uint32(3) * f, np.uint32(3) * n
+        is_live = surface.corner_vertex[corner] != DEAD
+        place[f] = np.int32(n) if is_live else -1
         if not is_live:
             continue
-        for k in range(3):
-            to.corner_vertex[3 * n + k] = surface.corner_vertex[3 * f + k]
-            to.verdict[3 * n + k] = surface.verdict[3 * f + k]
+        for _ in range(3):
+            to.corner_vertex[to_corner] = surface.corner_vertex[corner]
+            to.verdict[to_corner] = surface.verdict[corner]
+            corner, to_corner = corner + one, to_corner + one
         if cost is not None:
-            for k in range(COLUMNS):
-                to_cost[COLUMNS * n + k] = cost[COLUMNS * f + k]
+            place_of_cost, to_place = np.uint32(COLUMNS) * f, np.uint32(COLUMNS) * n
+            for _ in range(COLUMNS):
+                to_cost[to_place] = cost[place_of_cost]
+                place_of_cost, to_place = place_of_cost + one, to_place + one
         to.face_state[n] = surface.face_state[f]
         to_origin[n] = item(origin, f)
-        n += 1
+        n += one
 
 
 @kernel_in_place
