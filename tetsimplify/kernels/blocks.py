@@ -12,14 +12,20 @@ SHARED = -1  # no block has all faces of the vertex
 def _cell_of(cells, f):
     """The cell of a face; the run that it is in, where there is no list of cells."""
     cell, bits = cells
-    return np.int64(cell[f]) if cell.size else f >> bits
+    return np.uint32(cell[np.uint32(f)]) if cell.size else np.uint32(f >> bits)
+
+
+@part
+def _is_live(corner_vertex, f):
+    """Whether a face is live."""
+    return corner_vertex[np.uint32(3) * np.uint32(f)] != DEAD
 
 
 @kernel_in_place
 def count_live(corner_vertex, cells, first, last, n_faces):
     """Count the live ones of the faces from `first` to `last` in each cell."""
     for f in range(first, last):
-        if corner_vertex[3 * f] != DEAD:
+        if _is_live(corner_vertex, f):
             n_faces[_cell_of(cells, f)] += 1
 
 
@@ -81,9 +87,9 @@ def place_in_list(n_faces, first_cell, place, begin):
 def list_faces(corner_vertex, cells, block_of, first, last, place, listed):
     """List live faces block by block."""
     for f in range(first, last):
-        if corner_vertex[3 * f] != DEAD:
-            block = block_of[_cell_of(cells, f)]
-            listed[place[block]] = f
+        if _is_live(corner_vertex, f):
+            block = np.uint32(block_of[_cell_of(cells, f)])
+            listed[np.uint32(place[block])] = f
             place[block] += 1
 
 
@@ -91,27 +97,30 @@ def list_faces(corner_vertex, cells, block_of, first, last, place, listed):
 def note_blocks(corner_vertex, cells, block_of, first, last, vertex_block):
     """Note a block of each vertex: any of those that it is in."""
     for f in range(first, last):
-        if corner_vertex[3 * f] != DEAD:
-            block = block_of[_cell_of(cells, f)]
-            for corner in range(3 * f, 3 * f + 3):
-                vertex_block[corner_vertex[corner]] = block
+        if _is_live(corner_vertex, f):
+            block, corner = block_of[_cell_of(cells, f)], np.uint32(3) * np.uint32(f)
+            for _ in range(3):
+                vertex_block[np.uint32(corner_vertex[corner])] = block
+                corner += np.uint32(1)
 
 
 @kernel_in_place
 def find_shared(corner_vertex, cells, block_of, first, last, vertex_block):
     """Find the vertices that have faces in another block than the one noted."""
     for f in range(first, last):
-        if corner_vertex[3 * f] != DEAD:
-            block = block_of[_cell_of(cells, f)]
-            for corner in range(3 * f, 3 * f + 3):
-                if vertex_block[corner_vertex[corner]] != block:
-                    vertex_block[corner_vertex[corner]] = SHARED
+        if _is_live(corner_vertex, f):
+            block, corner = block_of[_cell_of(cells, f)], np.uint32(3) * np.uint32(f)
+            for _ in range(3):
+                v = np.uint32(corner_vertex[corner])
+                if vertex_block[v] != block:
+                    vertex_block[v] = SHARED
+                corner += np.uint32(1)
 
 
 @kernel_in_place
 def copy_cells(corner_vertex, cell, first, last, n, to):
     """Copy the cells of the live faces from `first` to `last`, in order, from place `n` on."""
     for f in range(first, last):
-        if corner_vertex[3 * f] != DEAD:
-            to[n] = cell[f]
+        if _is_live(corner_vertex, f):
+            to[np.uint32(n)] = cell[np.uint32(f)]
             n += 1

@@ -70,15 +70,15 @@ def _digit(coded, shift):
 def count_digits(coded, shift, first, last, n):
     """Count how often each digit occurs."""
     for i in range(first, last):
-        n[_digit(coded[i], shift)] += 1
+        n[np.uint32(_digit(coded[i], shift))] += 1
 
 
 @kernel_in_place
 def sort_by_digit(coded, shift, first, last, begin, to):
     """Sort by a digit, and what has the same one in the order in which it is."""
     for i in range(first, last):
-        digit = _digit(coded[i], shift)
-        to[begin[digit]] = coded[i]
+        digit = np.uint32(_digit(coded[i], shift))
+        to[np.uint32(begin[digit])] = coded[i]
         begin[digit] += 1
 
 
@@ -88,9 +88,9 @@ def number_in_order(coded, vertices, first, last, origin, place, to):
     for i in range(first, last):
         v = np.int32(coded[i] & 0x7FFFFFFF)
         origin[i] = v
-        place[v] = i
+        place[np.uint32(v)] = i
         for axis in range(3):
-            to[i, axis] = vertices[v, axis]
+            to[i, axis] = vertices[np.uint32(v), axis]
 
 
 @kernel_in_place
@@ -126,8 +126,8 @@ def take_cells(faces, of_vertices, first, last, cell, is_used):
         1 for these cells.
     """
     for f in range(first, last):
-        cell[f] = of_vertices[faces[f, 0]]
-        is_used[cell[f]] = 1
+        cell[f] = of_vertices[np.uint32(faces[f, 0])]
+        is_used[np.uint32(cell[f])] = 1
 
 
 @kernel_in_place
@@ -145,14 +145,26 @@ def number_cells(is_used):
 def renumber(number, first, last, cell):
     """Give the cells of faces their numbers."""
     for f in range(first, last):
-        cell[f] = number[cell[f]]
+        cell[f] = number[np.uint32(cell[f])]
+
+
+@part
+def _places(faces, place, f):
+    """The places of the vertices of a face."""
+    f = np.uint32(f)
+    return (
+        place[np.uint32(faces[f, 0])],
+        place[np.uint32(faces[f, 1])],
+        place[np.uint32(faces[f, 2])],
+    )
 
 
 @kernel_in_place
 def count_groups(faces, place, shift, first, last, n):
     """Count the faces whose first corners are among each 2**shift vertices in order."""
     for f in range(first, last):
-        n[min(place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]) >> shift] += 1
+        a, b, c = _places(faces, place, f)
+        n[np.uint32(min(a, b, c) >> shift)] += 1
 
 
 @kernel_in_place
@@ -176,9 +188,9 @@ def sort_by_group(faces, place, shift, first, last, begin, origin, to):
         The same with the places of their vertices.
     """
     for f in range(first, last):
-        a, b, c = place[faces[f, 0]], place[faces[f, 1]], place[faces[f, 2]]
-        group = min(a, b, c) >> shift
-        at = begin[group]
+        a, b, c = _places(faces, place, f)
+        group = np.uint32(min(a, b, c) >> shift)
+        at = np.uint32(begin[group])
         begin[group] += 1
         origin[at] = f
         to[at, 0], to[at, 1], to[at, 2] = a, b, c

@@ -14,7 +14,7 @@ def count_live_faces(corner_vertex, first, last):
     """Count the live ones of the faces from `first` to `last`."""
     n = 0
     for f in range(first, last):
-        n += corner_vertex[3 * f] != DEAD
+        n += corner_vertex[np.uint32(3) * np.uint32(f)] != DEAD
     return n
 
 
@@ -63,24 +63,26 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
 @kernel_in_place
 def copy_links(surface, first, last, place, to):
     """Link the corners of the live ones of the faces from `first` to `last`, in the same order."""
-    next_corner = surface.next_corner
-    for f in range(first, last):
-        n = place[f]
-        if n < 0:
+    next_corner, three = surface.next_corner, np.uint32(3)
+    for face in range(first, last):
+        f = np.uint32(face)
+        if place[f] < 0:
             continue
-        for k in range(3):
-            c = np.uint32(next_corner[3 * f + k])
-            while place[c // np.uint32(3)] < 0:
+        to_first = three * np.uint32(place[f])
+        for k in range(np.uint32(3)):
+            c = np.uint32(next_corner[three * f + np.uint32(k)])
+            while place[c // three] < 0:
                 c = np.uint32(next_corner[c])
-            across = c // np.uint32(3)
-            to.next_corner[3 * n + k] = 3 * place[across] + (c - np.uint32(3) * across)
+            across = c // three
+            to_corner = three * np.uint32(place[across]) + (c - three * across)
+            to.next_corner[to_first + np.uint32(k)] = to_corner
 
 
 @kernel_in_place
 def mark_vertices(corner_vertex, is_used):
     """Mark the vertices that corners have with 1."""
     for corner in range(corner_vertex.size):
-        is_used[corner_vertex[corner]] = 1
+        is_used[np.uint32(corner_vertex[corner])] = 1
 
 
 @kernel_in_place
@@ -145,9 +147,11 @@ def follow_merges(merged_into, number, visit, of_target):
     """
     for i in range(visit.size):
         w = visit[i]
-        while merged_into[w] >= 0 and merged_into[w] != w:
-            w = merged_into[w]
-        of_target[i] = number[w]
+        into = merged_into[np.uint32(w)]
+        while into >= 0 and into != w:
+            w = into
+            into = merged_into[np.uint32(w)]
+        of_target[i] = number[np.uint32(w)]
 
 
 @kernel_in_place
@@ -163,7 +167,7 @@ def copy_vertices(vertices, number, first, last, out):
 def renumber_corners(number, corner_vertex):
     """Give corners the new numbers of their vertices."""
     for corner in range(corner_vertex.size):
-        corner_vertex[corner] = number[corner_vertex[corner]]
+        corner_vertex[corner] = number[np.uint32(corner_vertex[corner])]
 
 
 @kernel_in_place
@@ -171,7 +175,10 @@ def edge_extremes(vertices, corner_vertex):
     """Lengths of the shortest and of the longest edge; infinite and 0 when there is none."""
     shortest2, longest2 = np.inf, 0.0
     for f in range(corner_vertex.size // 3):
-        a, b, c = corner_vertex[3 * f], corner_vertex[3 * f + 1], corner_vertex[3 * f + 2]
+        first = np.uint32(3) * np.uint32(f)
+        a = np.uint32(corner_vertex[first])
+        b = np.uint32(corner_vertex[first + np.uint32(1)])
+        c = np.uint32(corner_vertex[first + np.uint32(2)])
         for p, q in ((a, b), (b, c), (c, a)):
             length2 = squared_length(vertices, p, q)
             shortest2, longest2 = min(shortest2, length2), max(longest2, length2)
