@@ -125,10 +125,10 @@ def _link_range(corner_vertex, first, last, first_corner, next_corner):
         if high < least or low >= above:
             continue
         for i in range(run.size):
-            v = run[i]
+            v, corner = run[i], np.uint32(begin + i)
             if least <= v < above:
-                next_corner[begin + i] = first_corner[v]
-                first_corner[v] = begin + i
+                next_corner[corner] = first_corner[np.uint32(v)]
+                first_corner[np.uint32(v)] = corner
 
 
 @kernel_in_place
@@ -181,9 +181,9 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         lower = np.int32(0)
         while True:
             a, b = others(corner_vertex, corner)
-            i = n_arcs & (MOST_ARCS - 1)
+            i = np.uint32(n_arcs & (MOST_ARCS - 1))
             tail[i], head[i], corners[i] = a, b, corner
-            slot = a & last_slot
+            slot = np.uint32(a & last_slot)
             entry[slot], successor[slot], entered[slot] = stamp | a, b, corner
             n_arcs += 1
             # edges and faces count at their lowest vertex
@@ -192,9 +192,10 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
             begins = (a < v) & (b > v)
             n_runs += begins
             lower = a if begins else lower
-            if next_corner[corner] < 0:
+            following = next_corner[np.uint32(corner)]
+            if following < 0:
                 break
-            corner = next_corner[corner]
+            corner = following
         next_corner[corner] = latest
         first_corner[v] = corner
         longest = max(longest, n_arcs)
@@ -206,10 +207,14 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         w = begin
         n_followed = 0
         previous = latest
-        while n_followed < n_arcs <= MOST_ARCS and entry[w & last_slot] == stamp | w:
-            next_corner[previous] = entered[w & last_slot]
-            previous = next_corner[previous]
-            w = successor[w & last_slot]
+        while n_followed < n_arcs <= MOST_ARCS:
+            slot = np.uint32(w & last_slot)
+            if entry[slot] != stamp | w:
+                break
+            following = entered[slot]
+            next_corner[np.uint32(previous)] = following
+            previous = following
+            w = successor[slot]
             n_followed += 1
             if w == begin:
                 break
