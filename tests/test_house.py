@@ -117,7 +117,9 @@ def test_public_names_are_documented():
     for name in tetsimplify.__all__:
         item = getattr(tetsimplify, name)
         assert item.__doc__, name
-        if callable(item) and not isinstance(item, type):
+        if name == "hand_back_memory":  # which takes and gives nothing
+            assert "Examples" in item.__doc__
+        elif callable(item) and not isinstance(item, type):
             for section in ("Parameters", "Returns", "Raises", "Examples"):
                 assert re.search(rf"^\s*{section}\n\s*-+", item.__doc__, re.M), (name, section)
 

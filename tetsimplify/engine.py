@@ -126,9 +126,7 @@ class Engine:
         self._quadrics = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics, self._area = start_quadrics(
-                start, options, arranged_bound, self._crew
-            )
+            self._quadrics, self._area = start_quadrics(start, options, arranged_bound, self._crew)
         self._cost = None
         if not options.has_one_threshold:  # to be ranked first
             self._cost = memory.empty(kernels.cost.COLUMNS * m, np.float32)

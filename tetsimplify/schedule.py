@@ -17,7 +17,7 @@ from tetsimplify.engine import Engine
 from tetsimplify.options import Progress
 
 FULL_SWEEP = 100  # a sweep that contracts less than one in so many faces lets all be retried
-SHARES = (0.2, 0.1, 0.02)  # of the edges are below the next threshold: far from the end, then near
+SHARES = (0.2, 0.1, 0.04)  # of the edges are below the next threshold: far from the end, then near
 FAR, NEAR = 4.0, 2.0  # times the faces asked for are left
 LENIENCE = 2.0  # far from the end: triangles that become worse have time to become better again
 SUCCESS, LEAST_SUCCESS = 0.5, 0.2  # part of the edges below a threshold that can be contracted
