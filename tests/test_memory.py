@@ -22,6 +22,12 @@ def nothing_kept():
     memory.hand_back_memory()
 
 
+def ball():
+    """A volume with a sphere in it."""
+    x, y, z = np.mgrid[-1:1:24j, -1:1:24j, -1:1:24j]
+    return 0.6 - np.sqrt(x * x + y * y + z * z)
+
+
 def kept():
     """Bytes that are kept."""
     return sum(size * len(blocks) for size, blocks in memory._kept.items())
@@ -103,6 +109,30 @@ def test_memory_is_handed_back():
     assert kept() > 0
     memory.hand_back_memory()
     assert kept() == 0
+
+
+@needs_lazy_freeing
+def test_nothing_is_kept_where_memory_is_dear():
+    memory.empty(N)
+    outer = memory.empty(N + 1)
+    with memory.nothing_kept():
+        assert kept() == 0
+        memory.empty(N)
+        with memory.nothing_kept():
+            del outer
+        memory.empty(N)
+        assert kept() == 0
+    memory.empty(N)
+    assert kept() > 0
+
+
+@needs_lazy_freeing
+def test_streams_keep_nothing(monkeypatch):
+    monkeypatch.setattr(memory, "LARGE", 1)
+    tetsimplify.extract_and_simplify(ball(), 0.0, max_edge_length=0.5, threads=2)
+    assert kept() == 0
+    tetsimplify.simplify(*tetsimplify.extract_isosurface(ball(), 0.0), max_edge_length=0.5)
+    assert kept() > 0
 
 
 def test_no_two_arrays_of_several_threads_share_memory():

@@ -3,7 +3,8 @@
 Memory that is new to a process has to be cleared by the system first, page by page, and on a
 virtual machine to be had from its host before that. A run would wait for this again and again: it
 needs a few large arrays for a short time. So what they took is kept for the next ones. The system
-is told that nothing is in it any more, and takes it when it runs short.
+is told that nothing is in it any more, and takes it when it runs short. Until then a run takes a
+tenth to a quarter more, so nothing is kept where little memory is the aim: see `nothing_kept`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import mmap
 import sys
 import weakref
 from collections import deque
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -27,13 +29,14 @@ FITS = 2  # times the size that is asked for: larger blocks are left for larger 
 CAN_KEEP = hasattr(mmap, "MADV_FREE")
 
 _kept: dict[int, deque[mmap.mmap]] = {}  # by size; what is done with it at once needs no lock
+_frugal: list[int] = []  # an entry for each block that is under way where nothing is kept
 
 
 def empty(shape: int | tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray:
     """An array that is not filled, as of NumPy. Its memory is kept when nothing refers to it."""
     shape = shape if isinstance(shape, tuple) else (shape,)
     size = math.prod(shape) * np.dtype(dtype).itemsize
-    if size < LARGE or not CAN_KEEP:
+    if size < LARGE or not CAN_KEEP or _frugal:
         return np.empty(shape, dtype)
     block = _take(size)
     array: NDArray = np.ndarray(shape, dtype, block)
@@ -46,6 +49,17 @@ def full(shape: int | tuple[int, ...], value: float, dtype: DTypeLike) -> NDArra
     array = empty(shape, dtype)
     array.fill(value)
     return array
+
+
+@contextmanager
+def nothing_kept() -> Iterator[None]:
+    """Keep no memory of large arrays in a ``with`` block, whichever thread has them."""
+    _kept.clear()
+    _frugal.append(0)
+    try:
+        yield
+    finally:
+        _frugal.pop()
 
 
 def _take(size: int) -> mmap.mmap:
@@ -71,6 +85,8 @@ def _mapped(size: int, advice: str) -> mmap.mmap:
 
 def _keep(block: mmap.mmap) -> None:
     """Keep a block that nothing refers to, for later."""
+    if _frugal:
+        return
     if sum(size * len(blocks) for size, blocks in list(_kept.items())) + len(block) <= MOST_KEPT:
         with suppress(OSError):  # where the system cannot take it back, it is not kept
             block.madvise(mmap.MADV_FREE)

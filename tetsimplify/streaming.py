@@ -20,7 +20,7 @@ from tetsimplify.errors import OptionError
 from tetsimplify.isosurface import as_source
 from tetsimplify.levels import as_levels
 from tetsimplify.march import March, blocks
-from tetsimplify.memory import hand_back_memory
+from tetsimplify.memory import hand_back_memory, nothing_kept
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import DEFAULT_FOLDOVER, Options, Progress
 from tetsimplify.pieces import (
@@ -58,6 +58,7 @@ class SimplifiedIsosurface(NamedTuple):
     """As of :func:`tetsimplify.simplify` for the whole surface."""
 
 
+@nothing_kept()
 def extract_and_simplify(
     volume: ArrayLike | Function,
     level: float | str,
