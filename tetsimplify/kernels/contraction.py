@@ -6,7 +6,7 @@ the new vertex get the state `colour`.
 
 import numpy as np
 
-from tetsimplify.kernels.corners import DEAD, ahead, face_of
+from tetsimplify.kernels.corners import DEAD, ahead
 from tetsimplify.kernels.cost import COLUMNS, LEAST
 from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
@@ -178,8 +178,8 @@ def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
         surface.face_state[f] = SETTLED
         if cost is not None:
             cost[COLUMNS * f + LEAST] = np.inf
-        for k in range(3):
-            corner_vertex[3 * f + k] = DEAD
+        for corner in range(3 * f, 3 * f + 3):
+            corner_vertex[np.uint32(corner)] = DEAD
     scratch.tally[N_LIVE] -= n_doomed
     scratch.tally[N_SPARE] -= n_doomed
 
@@ -197,22 +197,24 @@ def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
 
     star, n = lists[STAR], n_v + n_u
     for i in range(n_v, n):
-        corner_vertex[star[i]] = v
-    for i in range(n):
-        surface.next_corner[star[i]] = star[i + 1 if i + 1 < n else 0]
-        f = face_of(star[i])
-        surface.face_state[f] = _touched(surface.face_state, star[i], colour)
+        corner_vertex[np.uint32(star[i])] = v
+    following = star[0]
+    for i in range(n - 1, -1, -1):
+        corner = np.uint32(star[i])
+        surface.next_corner[corner] = following
+        following = star[i]
+        f = corner // np.uint32(3)
+        surface.face_state[f] = _touched(surface.face_state, corner, f, colour)
         if cost is not None:
-            cost[COLUMNS * f + LEAST] = -np.inf
+            cost[np.uint32(COLUMNS) * f + np.uint32(LEAST)] = -np.inf
 
 
 @part
-def _touched(face_state, corner, colour):
+def _touched(face_state, corner, f, colour):
     """The state of a face the vertex of whose corner has moved."""
     if colour < MOVED_EVEN:
         return colour
-    f = face_of(corner)
-    state, k = face_state[f], corner - 3 * f
+    state, k = face_state[f], np.int64(corner - np.uint32(3) * f)
     if state == RANKED or state == MOVED_EVEN + k or state == MOVED_ODD + k:
         return colour + k
     return STALE_EVEN if colour == MOVED_EVEN else STALE_ODD

@@ -70,15 +70,15 @@ def _go_around(surface, scratch, corner, v, u, stamp):
     x = vertex_behind(corner_vertex, corner)
     doomed[0] = face_of(corner)
     ring[0] = x
-    n = 0
-    c = next_corner[corner]
+    n, one = np.uint32(0), np.uint32(1)
+    c = next_corner[np.uint32(corner)]
     while True:
         p = vertex_behind(corner_vertex, c)
         star[n] = c
-        ring[n + 1] = p
+        ring[n + one] = p
         if p == u:
             break
-        n += p != DEAD
+        n += np.uint32(p != DEAD)
         p = np.uint32(p if p != DEAD else v)
         mark[p] = stamp
         prefetch_row(surface.vertices, p)  # the guards read it
@@ -88,20 +88,20 @@ def _go_around(surface, scratch, corner, v, u, stamp):
     y = ring[n]
 
     n_common = 2
-    c = next_corner[ahead(corner)]
+    c = next_corner[np.uint32(ahead(corner))]
     while True:
         p = vertex_behind(corner_vertex, c)
         star[n] = c
-        ring[n + 1] = p
+        ring[n + one] = p
         p = p if p != DEAD else y
-        n += p != y
+        n += np.uint32(p != y)
         n_common += (p != y) & (mark[np.uint32(p)] == stamp)
         prefetch_row(surface.vertices, np.uint32(p))
         if p == x:
             break
         c = next_corner[np.uint32(c)]
     scratch.tally[RING_V], scratch.tally[RING_ALL], scratch.tally[N_GAPS] = n_v, n, 0
-    return n_v, n - n_v, 2, n_common
+    return np.int64(n_v), np.int64(n) - np.int64(n_v), 2, n_common
 
 
 @cold_part
