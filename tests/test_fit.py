@@ -13,7 +13,7 @@ from test_simplify import assert_same_topology
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.crew import Crew
-from tetsimplify.fit import COS_TURN, EXACT, LIGHT, THOROUGH, Links, Plan, _Fit, fit_vertices
+from tetsimplify.fit import COS_TURN, EXACT, LIGHT, THOROUGH, Links, _Fit, fit_mesh
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options
 from tetsimplify.topology import examine
@@ -38,7 +38,7 @@ def fitted(mesh, result, *, held=None, threads=1, **more):
     _, loop, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
     held = (loop >= 0).astype(np.uint8) if held is None else held
     links = Links(first_corner, next_corner)
-    return fit_vertices(as_mesh(*mesh), made, result.vertex_map, held, links, threads, **more)
+    return fit_mesh(as_mesh(*mesh), made, result.vertex_map, held, links, threads, **more).vertices
 
 
 def mean_distance(mesh, vertices, faces):
@@ -157,7 +157,7 @@ def test_steps_solve_the_least_squares():
     mesh = meshes.icosphere(4)
     result = contracted(mesh, keep_ratio=0.1)
     stiffness = 0.05
-    plan = Plan(per_face=3.5, least_stride=1, rounds=1, sweeps=300, stiffness=stiffness, pull=0.0)
+    plan = LIGHT._replace(sweeps=300, stiffness=stiffness, pull=0.0)
     fit = started(mesh, result, plan)
     n = len(result.vertices)
     matrix, right = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
@@ -200,9 +200,10 @@ def test_curved_surfaces_come_nearer_and_keep_their_topology(name, ratio):
         contracted(mesh, keep_ratio=ratio),
         tetsimplify.simplify(*mesh, keep_ratio=ratio),
     )
-    assert np.array_equal(before.faces, after.faces)
+    stay = (before.faces == after.faces).all(axis=1)
+    assert stay.mean() > 0.8 and (stay.all() or ratio < 1 / 16)
     assert_same_topology(mesh[1], after)
-    assert_faces_kept(before.vertices, after.vertices, after.faces)
+    assert_faces_kept(before.vertices, after.vertices, after.faces[stay])
     assert mean_distance(mesh, *after[:2]) < 0.97 * mean_distance(mesh, *before[:2])
     shapes = [tetsimplify.quality(*result[:2]).radius_ratio.mean() for result in (before, after)]
     assert shapes[1] > shapes[0]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_extremes
 from tetsimplify.engine import Engine, Result
-from tetsimplify.fit import Links, fit_vertices, pays
+from tetsimplify.fit import Links, fit_mesh, pays
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress, cosine_of
 from tetsimplify.report import Repaired, Simplification, SimplificationReport
@@ -76,7 +76,8 @@ def contract(
         examined = examine(result.faces.reshape(-1), len(result.vertices), threads=engine.n_threads)
     if mesh is not None and options.fits:
         with clock.stage("fit"):
-            result = _fitted(engine, mesh, result, examined, locked, progress)
+            flips = not face_data  # which belong to one face given, not to parts of two
+            result = _fitted(engine, mesh, result, examined, locked, flips, progress)
 
     report = SimplificationReport(
         options=options,
@@ -112,24 +113,29 @@ def _fitted(
     result: Result,
     examined: Examined,
     locked: NDArray[np.bool_],
+    flips: bool,
     progress: Progress | None,
 ) -> Result:
-    """The result with its vertices moved nearer to the mesh given; those that are locked stay."""
+    """The result brought nearer to the mesh given; vertices that are locked stay.
+
+    Edges that are turned over change nothing of what `examined` tells of the topology.
+    """
     options, made = engine.options, Mesh(result.vertices, result.faces)
     if options.fit is not True and not pays(mesh, made):
         return result
     held = (examined.loop >= 0).astype(np.uint8)
     kept = result.vertex_map[locked]
     held[kept[kept >= 0]] = 1
-    vertices = fit_vertices(
+    fitted = fit_mesh(
         *(mesh, made, result.vertex_map, held),
         *(Links(examined.first_corner, examined.next_corner), engine.n_threads),
         cos_turn=cosine_of(options.foldover),
         cos_feature=None if options.feature_angle is None else cosine_of(options.feature_angle),
+        flips=flips,
         progress=progress,
     )
-    shortest, _ = edge_extremes(Mesh(vertices, result.faces), Crew(engine.n_threads))
-    return result._replace(vertices=vertices, shortest_edge=shortest)
+    shortest, _ = edge_extremes(fitted, Crew(engine.n_threads))
+    return result._replace(vertices=fitted.vertices, faces=fitted.faces, shortest_edge=shortest)
 
 
 def after_repair(result: Simplification, repaired: Repaired) -> Simplification:

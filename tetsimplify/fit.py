@@ -1,9 +1,10 @@
-"""Vertices of a simplified mesh, moved so that it is nearer to the mesh given.
+"""A simplified mesh brought nearer to the mesh given: vertices moved, edges turned over.
 
 Contraction puts each vertex where the planes merged into it want it. What counts in the end is how
 far the faces are from the surface given. So samples of that are taken, each is given to the nearest
 face of the result, and all vertices move a little so that the squared heights of the samples above
-their faces become least: see kernels/samples.py and kernels/fit.py. Faces and topology stay.
+their faces become least: see kernels/samples.py and kernels/fit.py. Where there is time, edges are
+turned over in between by the same samples, see flips.py. The topology stays.
 
 The work is done in parts that depend on the meshes alone, and so does the result.
 """
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
+from tetsimplify.flips import Flips, Table, Taken, find_thin
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress
 
@@ -50,6 +52,8 @@ class Plan(NamedTuple):
     """Of so many faces given one has a sample in a round, at most."""
     rounds: int
     """How often samples are taken."""
+    flips: int
+    """After how many of these edges are turned over by them."""
     sweeps: int
     """Over the equations of a round."""
     stiffness: float
@@ -59,8 +63,10 @@ class Plan(NamedTuple):
 
 LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly anything is gained
 FEW = 16.0  # where there are as many, there is time for more, and more to gain
-LIGHT = Plan(per_face=3.5, least_stride=1, rounds=1, sweeps=1, stiffness=0.01, pull=0.2)
-THOROUGH = Plan(per_face=10.0, least_stride=4, rounds=2, sweeps=2, stiffness=0.0015, pull=0.3)
+LIGHT = Plan(per_face=3.5, least_stride=1, rounds=1, flips=0, sweeps=1, stiffness=0.01, pull=0.2)
+THOROUGH = Plan(
+    per_face=8.0, least_stride=4, rounds=3, flips=1, sweeps=2, stiffness=0.0015, pull=0.3
+)
 
 
 class Links(NamedTuple):
@@ -77,7 +83,7 @@ def pays(given: Mesh, made: Mesh) -> bool:
     return len(given.faces) >= LEAST * len(made.faces)
 
 
-def fit_vertices(
+def fit_mesh(
     given: Mesh,
     made: Mesh,
     vertex_map: Indices,
@@ -87,9 +93,10 @@ def fit_vertices(
     *,
     cos_turn: float = COS_TURN,
     cos_feature: float | None = None,
+    flips: bool = False,
     progress: Progress | None = None,
-) -> Array:
-    """Move the vertices of a simplified mesh nearer to the mesh given.
+) -> Mesh:
+    """Bring a simplified mesh nearer to the mesh given.
 
     Parameters
     ----------
@@ -99,7 +106,8 @@ def fit_vertices(
     vertex_map : ndarray, shape (n given,), int32
         The vertex that each one given was merged into, -1 where it was removed.
     held : ndarray, shape (n,), uint8
-        Which vertices stay exactly where they are. More are marked, with `cos_feature`.
+        Which vertices stay exactly where they are, and the edges between them. More are marked,
+        with `cos_feature`.
     links : Links
         Of the mesh made, corners in order.
     threads : int
@@ -109,27 +117,37 @@ def fit_vertices(
         its area either.
     cos_feature : float, optional
         Cosine of the angle from which on the vertices of an edge are held.
+    flips : bool
+        Whether edges may be turned over: with many faces given for each that is left, where that
+        gains something, and else where faces have no height.
     progress : callable, optional
         Called as ``progress("fit", done)``. Raise from it to cancel.
 
     Returns
     -------
-    ndarray, shape (n, 3), float64
+    Mesh
+        As many vertices and faces. A face of which a side was turned over is in the place of one of
+        the two that were there.
     """
     size = _size(made)
     if len(made.faces) in (0, len(given.faces)) or not 1.0 / LARGEST < size < LARGEST:
-        return made.vertices
+        return made
     plan = THOROUGH if len(given.faces) >= FEW * len(made.faces) else LIGHT
-    n_tasks = 3 + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
+    n_tasks = 3 + flips + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
     fit = _Fit(made, held, links, size, Crew(threads, progress, "fit", n_tasks))
+    cosine = max(cos_turn, COS_TURN)
     for i in range(plan.rounds):
         fit.measure()
         if cos_feature is not None and i == 0:
             fit.hold_features(cos_feature)
         fit.take_samples(given, vertex_map, plan, i)
         fit.solve(plan)
-        fit.move(max(cos_turn, COS_TURN))
-    return fit.vertices()
+        fit.move(cosine)
+        if flips and i < plan.flips:
+            fit.turn_over(cosine)
+    if flips:
+        fit.turn_over_caps(cosine)
+    return Mesh(fit.vertices(), fit.faces)
 
 
 def _size(mesh: Mesh) -> float:
@@ -150,6 +168,11 @@ class _Fit:
     links : Links
     size : float
     crew : Crew
+
+    Attributes
+    ----------
+    faces : ndarray, shape (m, 3), int32
+        As they are now.
     """
 
     def __init__(
@@ -157,8 +180,9 @@ class _Fit:
     ) -> None:
         n, m = len(made.vertices), len(made.faces)
         self._made, self._held, self._crew = made, held, crew
-        self._links = tuple(links)
-        self._corner_vertex = made.faces.reshape(-1)
+        self._links = links
+        self.faces = made.faces
+        self._is_own = False  # whether faces and links are copies
         low, high = kernels.order.bounds(made.vertices)
         # a power of two: so a mesh twice as large gives the same
         self._frame = low + 0.5 * (high - low), 2.0 ** -math.frexp(size)[1]
@@ -168,6 +192,7 @@ class _Fit:
         self._steps, self._steps_before = memory.empty((n, 3)), memory.empty((n, 3))
         self._sums = memory.cache_lines(m).view(np.float32)
         self._samples: Samples | None = None
+        self._ends: NDArray[np.int64] | None = None
         self._desks: SimpleQueue[Desk] = SimpleQueue()
 
         def enter(part: slice) -> None:
@@ -176,9 +201,9 @@ class _Fit:
             )
 
         crew.share(enter, n, AT_ONCE)
-        self._stars = self._new_stars()
+        self._stars = self._new_stars(crew)
 
-    def _new_stars(self) -> Stars:
+    def _new_stars(self, crew: Crew) -> Stars:
         """Room for the faces around each vertex."""
         n, kernel = len(self._places), kernels.samples
         first = np.empty(n + 1, np.int32)
@@ -189,7 +214,7 @@ class _Fit:
         def give(part: slice) -> None:
             kernel.number_blocks(part.start, part.stop, begin[part.start // VERTICES], first)
 
-        begin = np.cumsum([0, *self._crew.share(count, n, VERTICES)])
+        begin = np.cumsum([0, *crew.share(count, n, VERTICES)])
         Crew(self._crew.n_threads).share(give, n, VERTICES)
         first[n] = begin[-1]
         lanes = memory.empty((int(begin[-1]), kernel.N_ROWS, kernel.LANES), np.float32)
@@ -207,12 +232,12 @@ class _Fit:
 
         def find_normals(part: slice) -> None:
             kernels.samples.find_normals(
-                self._places, self._made.faces, part.start, part.stop, self._normals
+                self._places, self.faces, part.start, part.stop, self._normals
             )
 
         def fill(part: slice) -> None:
             kernels.samples.fill_stars(
-                *(self._places, self._corner_vertex, self._links, self._normals),
+                *(self._places, self.faces.reshape(-1), self._links, self._normals),
                 *(part.start, part.stop, self._stars),
             )
 
@@ -245,7 +270,7 @@ class _Fit:
             desk = self._take_desk()
             n = kernels.samples.take_samples(
                 *((*given, vertex_map), self._frame, self._places),
-                *(self._corner_vertex, self._normals, self._stars),
+                *(self.faces.reshape(-1), self._normals, self._stars),
                 *((part.start, part.stop, stride, offset), desk),
             )
             kernels.samples.sort_samples(
@@ -259,6 +284,7 @@ class _Fit:
                 samples, ends, self._normals, group, part.start, part.stop, EXACT**2, self._sums
             )
 
+        self._ends = ends
         self._crew.share(take, n_samples, SAMPLES)
         self._crew.share(add_up, m, 2**GROUP_BITS)
 
@@ -275,7 +301,7 @@ class _Fit:
 
         def solve(part: slice) -> None:
             kernels.fit.solve(
-                *(self._places, self._corner_vertex, self._links, self._sums),
+                *(self._places, self.faces.reshape(-1), self._links, self._sums),
                 *(self._held, solver, part.start, part.stop, self._steps_before, self._steps),
             )
 
@@ -292,7 +318,7 @@ class _Fit:
 
         def find_harmed(part: slice) -> None:
             kernels.fit.find_harmed(
-                *(self._places, self._made.faces, self._first_normals, self._steps, cos_turn),
+                *(self._places, self.faces, self._first_normals, self._steps, cos_turn),
                 *(stale, part.start, part.stop, harmed),
             )
 
@@ -309,6 +335,31 @@ class _Fit:
                 break
             crew = Crew(crew.n_threads)  # how often is not known before
         self._crew.share(move, n, AT_ONCE)
+
+    def turn_over(self, cos_turn: float) -> None:
+        """Turn edges over by the samples that were taken last, after the vertices have moved."""
+        assert self._samples is not None and self._ends is not None
+        assert self._first_normals is not None
+        taken = Taken(self._samples, self._ends, 2**GROUP_BITS, self._normals, self._steps)
+        flips = self._new_flips(cos_turn)
+        if self._first_normals is self._normals:  # those of the samples stay as they are
+            self._first_normals = self._normals.copy()
+        if flips.by_samples(self._places, taken, self._first_normals):
+            self._stars = self._new_stars(Crew(self._crew.n_threads))
+
+    def turn_over_caps(self, cos_turn: float) -> None:
+        """Turn over the longest sides of faces without height, after all else."""
+        thin = find_thin(self._places, self.faces, self._crew)
+        if thin.any():
+            self._new_flips(cos_turn).of_caps(self._places, thin, self._normals)
+
+    def _new_flips(self, cos_turn: float) -> Flips:
+        """What turns over edges of faces and links that are copies."""
+        if not self._is_own:
+            self.faces = self.faces.copy()
+            self._links, self._is_own = Links(*(part.copy() for part in self._links)), True
+        table, n_threads = Table(self.faces, *self._links), self._crew.n_threads
+        return Flips(table, self._held, cos_turn=cos_turn, exact=EXACT, threads=n_threads)
 
     def vertices(self) -> Array:
         """The vertices where they are now; shape (n, 3)."""
