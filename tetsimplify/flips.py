@@ -30,13 +30,13 @@ Mask = NDArray[np.uint8]
 VERTICES = 2**12  # in a part
 AT_ONCE = 2**15  # corners or faces in a part, where little is to be done
 
-SHAPE = 0.3  # weight of the sum of 2 r/R, beside the change of the error: -1 to 1
+SHAPE = 0.5  # weight of the sum of 2 r/R, beside the change of the error: -1 to 1
 LEAST = 0.03  # gain
 LEAST_FLAT = 0.01  # 2 r/R that two faces in a plane must gain
 WORST = 0.3  # 2 r/R below which no triangle may become worse than the worse one was
 FEW = 5.0  # samples of both faces: with fewer nothing is known of the error
 DOUBT = 5.0  # with so many samples the change of the error counts by half
-RISE = 1.25  # how many times the squared error may be what it was, for a better shape
+RISE = 2.0  # how many times the squared error may be what it was, for a better shape
 MOST_ROUNDS = 6  # in which edges of flat faces and of caps are turned over
 
 

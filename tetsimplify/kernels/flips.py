@@ -13,7 +13,7 @@ t. Away from there the two surfaces come together like a tent: where the barycen
 l_a and l_b, and the diagonals cross at the part s of the way from a to b, the new surface is above
 the old one by t phi, with phi = min(l_a / (1 - s), l_b / s). So a sample at the height r comes to
 be at r - t phi, and all that is needed of the samples of a face is the sum of r^2, and for each
-side those of r phi and phi^2.
+side those of r phi and phi^2 (of s (1 - s) phi, which needs no division).
 
 Beside that the shape of the triangles counts, by their 2 r/R (twice the radius of the incircle over
 that of the circumcircle): where the four vertices are in a plane it decides alone.
@@ -28,7 +28,7 @@ from tetsimplify.kernels.geometry import edge_vector, squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
 
 # Columns of the sums of a face. The first three groups are for the sides that begin at its corners.
-SPLIT, RISE, TENT2 = 0, 3, 6  # s, -1 where the side may not be turned over; of r phi, of phi^2
+SPLIT, RISE, TENT2 = 0, 3, 6  # s, -1 where the side may not be turned over; of r phi; of phi^2
 SHIFT = 9  # by how much the face has risen at its corners
 R2, COUNT = 12, 13  # of r^2, how many samples
 N_SUMS = 16  # a line of a cache
@@ -240,12 +240,11 @@ def _add_sample(foot, of_face):
 
 @part
 def _add_to_side(here, there, r, of_face, k):
-    """Add a sample to the sums of the k-th side."""
+    """Add a sample to the sums of the k-th side, whether that may be turned over or not."""
     s = of_face[SPLIT + k]
-    if s > np.float32(0.0):
-        tent = min(here * s, there * (np.float32(1.0) - s))
-        of_face[RISE + k] += r * tent
-        of_face[TENT2 + k] += tent * tent
+    tent = min(here * s, there * (np.float32(1.0) - s))
+    of_face[RISE + k] += r * tent
+    of_face[TENT2 + k] += tent * tent
 
 
 # --- gains ----------------------------------------------------------------------------------------
