@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
+Numbers = NDArray[np.int64]
 Mask = NDArray[np.uint8]
 
 VERTICES = 2**12  # in a part
@@ -86,7 +87,6 @@ class Flips:
         self._table, self._held, self._crew = table, held, Crew(threads)
         self._sums = memory.cache_lines(m).view(np.float32)
         self._edges = memory.empty((3 * m, kernels.flips.N_OF_EDGE), np.float32)
-        self._gains = memory.empty(3 * m, np.float32)
         self._flipper: Flipper = kernels.flips.Flipper(
             *(cos_turn, SHAPE, LEAST, WORST, FEW, RISE, DOUBT, exact**2)
         )
@@ -108,10 +108,10 @@ class Flips:
                 *(part.start // taken.group_size, part.start, part.stop, self._sums),
             )
 
-        stale = np.ones(len(places), np.uint8)
-        self._look(places, stale, self._flipper)
+        stale, corners = np.ones(len(places), np.uint8), np.arange(len(self._edges))
+        self._look(places, stale, corners, self._flipper)
         self._crew.share(add_up, len(self._table.faces), taken.group_size)
-        n = self._turn_over(places, stale, self._flipper, normals)
+        n = self._turn_over(places, stale, corners, self._flipper, normals)
         flat = self._flipper._replace(shape=1.0, least=LEAST_FLAT)
         return n + self._without_samples(places, stale, flat, normals)
 
@@ -133,15 +133,16 @@ class Flips:
         """Turn over around marked vertices as long as something is gained."""
         total = 0
         for _ in range(MOST_ROUNDS):
-            if not stale.any():
+            corners = np.flatnonzero(stale[self._table.faces])
+            if not len(corners):
                 break
-            self._look(places, stale, flipper)
-            self._sums[:, kernels.flips.COUNT] = 0.0
-            total += self._turn_over(places, stale, flipper, normals)
+            self._look(places, stale, corners, flipper)
+            self._sums[corners // 3, kernels.flips.COUNT] = 0.0
+            total += self._turn_over(places, stale, corners, flipper, normals)
         return total
 
-    def _look(self, places: Array, stale: Mask, flipper: Flipper) -> None:
-        """Tell what turning over edges of marked vertices would do."""
+    def _look(self, places: Array, stale: Mask, corners: Numbers, flipper: Flipper) -> None:
+        """Tell what turning over edges of marked vertices would do; `corners` are those of all."""
         faces, *links = self._table
 
         def look(part: slice) -> None:
@@ -150,27 +151,30 @@ class Flips:
                 *(part.start, part.stop, self._sums, self._edges),
             )
 
-        self._edges[:, kernels.flips.LIFT] = kernels.flips.NO_EDGE
+        self._edges[corners, kernels.flips.LIFT] = kernels.flips.NO_EDGE
         self._crew.share(look, len(places), VERTICES)
 
-    def _turn_over(self, places: Array, stale: Mask, flipper: Flipper, normals: Array) -> int:
+    def _turn_over(
+        self, places: Array, stale: Mask, corners: Numbers, flipper: Flipper, normals: Array
+    ) -> int:
         """Turn over what gains something, and mark the vertices of what has changed."""
         faces, *links = self._table
+        gains = memory.empty(len(corners), np.float32)
 
         def find_gains(part: slice) -> None:
             kernels.flips.find_gains(
-                *(self._edges, self._table.next_corner, self._sums, flipper),
-                *(part.start, part.stop, self._gains),
+                *(corners, self._edges, self._table.next_corner, self._sums, flipper),
+                *(part.start, part.stop, gains),
             )
 
-        self._crew.share(find_gains, len(self._gains), AT_ONCE)
-        found = np.flatnonzero(self._gains)
-        found = found[np.argsort(-self._gains[found], kind="stable")]
+        self._crew.share(find_gains, len(gains), AT_ONCE)
+        found = np.flatnonzero(gains)
+        order = corners[found[np.argsort(-gains[found], kind="stable")]]
         stale.fill(0)
         touched = np.zeros(len(faces), np.uint8)
         return int(
             kernels.flips.turn_over(
-                found, places, faces.reshape(-1), tuple(links), touched, stale, normals
+                order, places, faces.reshape(-1), tuple(links), touched, stale, normals
             )
         )
 

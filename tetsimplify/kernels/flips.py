@@ -251,27 +251,29 @@ def _add_to_side(here, there, r, of_face, k):
 
 
 @kernel_in_place
-def find_gains(edges, next_corner, sums, flipper, first, last, gains):
-    """What turning over the edges at the corners from `first` to `last` gains.
+def find_gains(corners, edges, next_corner, sums, flipper, first, last, gains):
+    """What turning over the edges at some corners, from the `first` to the `last` of them, gains.
 
     Parameters
     ----------
+    corners : int64 (k,)
     edges : float32 (3 m, N_OF_EDGE)
     next_corner : int32 (3 m,)
     sums : float32 (m, N_SUMS)
     flipper : Flipper
     first, last : int
-    gains : float32 (3 m,), out
+    gains : float32 (k,), out
         0 where nothing is gained.
     """
-    for corner in range(first, last):
-        gains[corner] = 0.0
+    for i in range(first, last):
+        corner = corners[i]
+        gains[i] = 0.0
         t = np.float64(edges[corner, LIFT])
         if t == NO_EDGE:
             continue
         gain = flipper.shape * np.float64(edges[corner, SHAPE])
         if edges[corner, CAP] != 0.0:
-            gains[corner] = CAP_GAIN + gain
+            gains[i] = CAP_GAIN + gain
             continue
         following = next_corner[corner]
         f, g = face_of(corner), face_of(following)
@@ -293,7 +295,7 @@ def find_gains(edges, next_corner, sums, flipper, first, last, gains):
                 continue
             gain += (old - new) / (old + new + floor) * n / (n + flipper.doubt)
         if gain > flipper.least:
-            gains[corner] = gain
+            gains[i] = gain
 
 
 # --- caps -----------------------------------------------------------------------------------------
