@@ -69,9 +69,9 @@ def started(mesh, result, plan, **held):
     """The state of a fit when it has taken samples."""
     made = Mesh(result.vertices, result.faces)
     _, _, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
-    size = float(np.ptp(made.vertices, axis=0).max())
+    box = made.vertices.min(axis=0), made.vertices.max(axis=0)
     nobody = np.zeros(len(made.vertices), np.uint8)
-    fit = _Fit(made, nobody, Links(first_corner, next_corner), size, Crew(1))
+    fit = _Fit(made, nobody, Links(first_corner, next_corner), box, Crew(1))
     fit.measure()
     fit.take_samples(as_mesh(*mesh), result.vertex_map, plan, 0)
     return fit

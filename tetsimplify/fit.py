@@ -129,12 +129,13 @@ def fit_mesh(
         As many vertices and faces. A face of which a side was turned over is in the place of one of
         the two that were there.
     """
-    size = _size(made)
+    low, high = _box(made)
+    size = float((high - low).max())
     if len(made.faces) in (0, len(given.faces)) or not 1.0 / LARGEST < size < LARGEST:
         return made
     plan = THOROUGH if len(given.faces) >= FEW * len(made.faces) else LIGHT
     n_tasks = 3 + flips + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
-    fit = _Fit(made, held, links, size, Crew(threads, progress, "fit", n_tasks))
+    fit = _Fit(made, held, links, (low, high), Crew(threads, progress, "fit", n_tasks))
     cosine = max(cos_turn, COS_TURN)
     for i in range(plan.rounds):
         fit.measure()
@@ -150,12 +151,10 @@ def fit_mesh(
     return Mesh(fit.vertices(), fit.faces)
 
 
-def _size(mesh: Mesh) -> float:
-    """The longest side of the box around the vertices."""
-    if not len(mesh.vertices):
-        return 0.0
-    low, high = kernels.order.bounds(mesh.vertices)
-    return float((high - low).max())
+def _box(mesh: Mesh) -> tuple[Array, Array]:
+    """The least and the largest coordinates; zeros where there are none."""
+    low, high = kernels.order.bounds(mesh.vertices) if len(mesh.vertices) else np.zeros((2, 3))
+    return low, high
 
 
 class _Fit:
@@ -166,7 +165,8 @@ class _Fit:
     made : Mesh
     held : ndarray, shape (n,), uint8
     links : Links
-    size : float
+    box : tuple
+        The least and the largest coordinates, each of shape (3,).
     crew : Crew
 
     Attributes
@@ -176,15 +176,21 @@ class _Fit:
     """
 
     def __init__(
-        self, made: Mesh, held: NDArray[np.uint8], links: Links, size: float, crew: Crew
+        self,
+        made: Mesh,
+        held: NDArray[np.uint8],
+        links: Links,
+        box: tuple[Array, Array],
+        crew: Crew,
     ) -> None:
         n, m = len(made.vertices), len(made.faces)
         self._made, self._held, self._crew = made, held, crew
         self._links = links
         self.faces = made.faces
         self._is_own = False  # whether faces and links are copies
-        low, high = kernels.order.bounds(made.vertices)
+        low, high = box
         # a power of two: so a mesh twice as large gives the same
+        size = float((high - low).max())
         self._frame = low + 0.5 * (high - low), 2.0 ** -math.frexp(size)[1]
         self._places = memory.empty((n, 3))
         self._normals = memory.empty((m, 4))

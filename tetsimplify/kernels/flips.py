@@ -24,8 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, face_of, others
-from tetsimplify.kernels.geometry import edge_vector, squared_length
+from tetsimplify.kernels.geometry import cross, dot, edge_vector, squared_length
 from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.samples import measure_face
 
 # Columns of the sums of a face. The first three groups are for the sides that begin at its corners.
 SPLIT, RISE, TENT2 = 0, 3, 6  # s, -1 where the side may not be turned over; of r phi; of phi^2
@@ -59,16 +60,6 @@ class Flipper(NamedTuple):
 
 
 @part
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@part
-def _cross(u, w):
-    return u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]
-
-
-@part
 def _shape(double, a, b, c):
     """2 r/R of a triangle, by its doubled area and its sides."""
     return 4.0 * double * double / (a * b * c * (a + b + c))
@@ -84,7 +75,7 @@ def _is_thin(double, a, b, c):
 @part
 def _turns(new, length, old, old_length, cosine):
     """Whether a new face turns too far from an old one."""
-    return not _dot(new, old) > cosine * length * old_length
+    return not dot(new, old) > cosine * length * old_length
 
 
 @part
@@ -92,19 +83,19 @@ def _look_at(places, a, p, b, r, flipper, of_edge):
     """Tell what turning over ab would do; return s, or -1 where it must not be done."""
     ab, ap, ar = edge_vector(places, a, b), edge_vector(places, a, p), edge_vector(places, a, r)
     pr, pb = edge_vector(places, p, r), edge_vector(places, p, b)
-    u = _cross(ab, pr)
-    double = np.sqrt(_dot(u, u))
+    u = cross(ab, pr)
+    double = np.sqrt(dot(u, u))
     if not double > 0.0:
         return -1.0
-    f, g, new_f, new_g = _cross(ap, ab), _cross(ab, ar), _cross(ap, ar), _cross(pb, pr)
-    f_up, g_up = _dot(f, u) / double, _dot(g, u) / double
-    new_f_up, new_g_up = _dot(new_f, u) / double, _dot(new_g, u) / double
+    f, g, new_f, new_g = cross(ap, ab), cross(ab, ar), cross(ap, ar), cross(pb, pr)
+    f_up, g_up = dot(f, u) / double, dot(g, u) / double
+    new_f_up, new_g_up = dot(new_f, u) / double, dot(new_g, u) / double
     if not (new_f_up > 0.0 and new_g_up > 0.0):
         return -1.0
-    len_f, len_g = np.sqrt(_dot(f, f)), np.sqrt(_dot(g, g))
-    len_new_f, len_new_g = np.sqrt(_dot(new_f, new_f)), np.sqrt(_dot(new_g, new_g))
-    l_ab, l_ap, l_ar = np.sqrt(_dot(ab, ab)), np.sqrt(_dot(ap, ap)), np.sqrt(_dot(ar, ar))
-    l_pr, l_pb = np.sqrt(_dot(pr, pr)), np.sqrt(_dot(pb, pb))
+    len_f, len_g = np.sqrt(dot(f, f)), np.sqrt(dot(g, g))
+    len_new_f, len_new_g = np.sqrt(dot(new_f, new_f)), np.sqrt(dot(new_g, new_g))
+    l_ab, l_ap, l_ar = np.sqrt(dot(ab, ab)), np.sqrt(dot(ap, ap)), np.sqrt(dot(ar, ar))
+    l_pr, l_pb = np.sqrt(dot(pr, pr)), np.sqrt(dot(pb, pb))
     l_br = np.sqrt(squared_length(places, b, r))
     flat_f, flat_g = _is_thin(len_f, l_ab, l_ap, l_pb), _is_thin(len_g, l_ab, l_ar, l_br)
     if (
@@ -131,7 +122,7 @@ def _look_at(places, a, p, b, r, flipper, of_edge):
     if min(new_1, new_2) < min(flipper.worst, min(old_1, old_2)):
         return -1.0
     cos_f, cos_g = new_f_up / len_new_f, new_g_up / len_new_g
-    of_edge[LIFT] = _dot(ap, u) / double
+    of_edge[LIFT] = dot(ap, u) / double
     of_edge[SHAPE] = new_1 + new_2 - old_1 - old_2
     of_edge[COS_F] = f_up / len_f if not flat_f else 1.0
     of_edge[COS_G] = g_up / len_g if not flat_g else 1.0
@@ -316,9 +307,9 @@ def mark_thin(places, faces, first, last, thin):
     for f in range(first, last):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         ab, ac, bc = edge_vector(places, a, b), edge_vector(places, a, c), edge_vector(places, b, c)
-        double = _cross(ab, ac)
-        longest2 = max(_dot(ab, ab), _dot(ac, ac), _dot(bc, bc))
-        if not _dot(double, double) > THIN * THIN * longest2 * longest2:
+        double = cross(ab, ac)
+        longest2 = max(dot(ab, ab), dot(ac, ac), dot(bc, bc))
+        if not dot(double, double) > THIN * THIN * longest2 * longest2:
             thin[a] = thin[b] = thin[c] = 1
 
 
@@ -403,16 +394,7 @@ def turn_over(order, places, corner_vertex, links, touched, stale, normals):
         corner_vertex[f_at_b], corner_vertex[j] = r, p
         touched[f] = touched[g] = 1
         stale[a] = stale[b] = stale[p] = stale[r] = 1
-        _measure(places, a, p, r, normals[f])
-        _measure(places, p, b, r, normals[g])
+        measure_face(places, a, p, r, normals[f])
+        measure_face(places, p, b, r, normals[g])
         n += 1
     return n
-
-
-@part
-def _measure(places, a, b, c, normal):
-    """Unit normal and area of a face."""
-    x, y, z = _cross(edge_vector(places, a, b), edge_vector(places, a, c))
-    length = np.sqrt(x * x + y * y + z * z)
-    q = 1.0 / length if length > 0.0 else 0.0
-    normal[0], normal[1], normal[2], normal[3] = x * q, y * q, z * q, 0.5 * length

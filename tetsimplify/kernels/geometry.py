@@ -1,4 +1,4 @@
-"""Edges as vectors, and their lengths."""
+"""Edges as vectors, their lengths, and products of vectors."""
 
 from tetsimplify.kernels.jit import part
 
@@ -20,3 +20,15 @@ def squared_length(vertices, a, b):
     dy = vertices[a, 1] - vertices[b, 1]
     dz = vertices[a, 2] - vertices[b, 2]
     return dx * dx + dy * dy + dz * dz
+
+
+@part
+def dot(a, b):
+    """The product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@part
+def cross(a, b):
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

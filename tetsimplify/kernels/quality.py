@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind
+from tetsimplify.kernels.geometry import cross, dot
 from tetsimplify.kernels.jit import kernel, part
 
 DEGREES = 180.0 / math.pi
@@ -44,18 +45,6 @@ class EdgeMeasures(NamedTuple):
     dihedral_angle: np.ndarray  # float64 (k,): degrees
     valence: np.ndarray  # int32 (n,)
     is_on_boundary: np.ndarray  # bool (n,): the vertex has an edge of one face
-
-
-@part
-def dot(a, b):
-    """The product of two vectors."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@part
-def cross(a, b):
-    """The vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @part

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, face_of, others
-from tetsimplify.kernels.geometry import edge_vector
+from tetsimplify.kernels.geometry import cross, edge_vector
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.prefetch import prefetch_row
 
@@ -61,22 +61,25 @@ class Samples(NamedTuple):
 
 
 @part
-def _cross(vertices, a, b, c):
-    """The cross product of the edges ab and ac."""
-    ux, uy, uz = edge_vector(vertices, a, b)
-    wx, wy, wz = edge_vector(vertices, a, c)
-    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+def _twice_area(vertices, a, b, c):
+    """The normal of a face, as long as twice its area."""
+    return cross(edge_vector(vertices, a, b), edge_vector(vertices, a, c))
+
+
+@part
+def measure_face(vertices, a, b, c, normal):
+    """Fill a row with the unit normal and the area of a face."""
+    x, y, z = _twice_area(vertices, a, b, c)
+    length = np.sqrt(x * x + y * y + z * z)
+    q = 1.0 / length if length > 0.0 else 0.0
+    normal[0], normal[1], normal[2], normal[3] = x * q, y * q, z * q, 0.5 * length
 
 
 @kernel_in_place
 def find_normals(places, faces, first, last, normals):
     """Unit normals and areas of the faces from `first` to `last`, in rows; float64 (m, 4)."""
     for f in range(first, last):
-        x, y, z = _cross(places, faces[f, 0], faces[f, 1], faces[f, 2])
-        length = np.sqrt(x * x + y * y + z * z)
-        q = 1.0 / length if length > 0.0 else 0.0
-        normals[f, 0], normals[f, 1], normals[f, 2] = x * q, y * q, z * q
-        normals[f, 3] = 0.5 * length
+        measure_face(places, faces[f, 0], faces[f, 1], faces[f, 2], normals[f])
 
 
 @kernel_in_place
@@ -239,7 +242,7 @@ def _begin_batch(given, frame, places, stars, first, last, stride, offset, desk)
         for axis in range(3):
             middle = 0.5 * vertices[a, axis] + 0.5 * vertices[b, axis]
             desk.place[n, axis] = (middle - origin[axis]) * scale
-        desk.place[n, 3], desk.place[n, 4], desk.place[n, 5] = _cross(vertices, a, b, c)
+        desk.place[n, 3], desk.place[n, 4], desk.place[n, 5] = _twice_area(vertices, a, b, c)
         desk.found[n, 0] = v
         prefetch_row(stars.first, v)
         prefetch_row(places, v)
