@@ -13,7 +13,6 @@ from tetsimplify import kernels, memory
 from tetsimplify.crew import Crew
 from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
-from tetsimplify.memory import sparse_zeros
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import BOUNDARY_WEIGHT, FEATURE_WEIGHT, Options
 from tetsimplify.topology import TopologyReport, examine, topology
@@ -201,10 +200,10 @@ def start_scratch(n_faces: int, n_coned: int, n_nodes: int) -> Scratch:
     scratch: Scratch = state.Scratch(
         tally=np.zeros(state.TALLY_SIZE, np.int64),
         mark=memory.full(n_coned, 0, np.int32),
-        face_mark=sparse_zeros(n_faces),
-        nodes=sparse_zeros(3, n_nodes),
-        lists=sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),
-        ring=sparse_zeros(2, 2 * n_faces + 4),
+        face_mark=memory.sparse_zeros(n_faces),
+        nodes=memory.sparse_zeros(3, n_nodes),
+        lists=memory.sparse_zeros(state.N_LISTS, max(n_faces + 2, room)),
+        ring=memory.sparse_zeros(2, 2 * n_faces + 4),
         point=np.zeros(state.POINT_SIZE),
         lanes=np.zeros(state.N_ROWS * state.WIDTH),
     )

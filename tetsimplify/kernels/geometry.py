@@ -32,3 +32,9 @@ def dot(a, b):
 def cross(a, b):
     """The vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@part
+def twice_area(vertices, a, b, c):
+    """The normal of a face, as long as twice its area."""
+    return cross(edge_vector(vertices, a, b), edge_vector(vertices, a, c))

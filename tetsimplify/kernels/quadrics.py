@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, others
+from tetsimplify.kernels.geometry import twice_area
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
@@ -217,10 +218,8 @@ def _add_plane(matrix, v, scale, x, y, z):
 @part
 def _area_vector(vertices, a, b, c):
     """Normal of a face, as long as its area."""
-    ox, oy, oz = vertices[a, 0], vertices[a, 1], vertices[a, 2]
-    px, py, pz = vertices[b, 0] - ox, vertices[b, 1] - oy, vertices[b, 2] - oz
-    qx, qy, qz = vertices[c, 0] - ox, vertices[c, 1] - oy, vertices[c, 2] - oz
-    return 0.5 * (py * qz - pz * qy), 0.5 * (pz * qx - px * qz), 0.5 * (px * qy - py * qx)
+    x, y, z = twice_area(vertices, a, b, c)
+    return 0.5 * x, 0.5 * y, 0.5 * z
 
 
 @kernel_in_place

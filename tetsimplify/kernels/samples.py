@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, face_of, others
-from tetsimplify.kernels.geometry import cross, edge_vector
+from tetsimplify.kernels.geometry import edge_vector, twice_area
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.prefetch import prefetch_row
 
@@ -61,15 +61,9 @@ class Samples(NamedTuple):
 
 
 @part
-def _twice_area(vertices, a, b, c):
-    """The normal of a face, as long as twice its area."""
-    return cross(edge_vector(vertices, a, b), edge_vector(vertices, a, c))
-
-
-@part
 def measure_face(vertices, a, b, c, normal):
     """Fill a row with the unit normal and the area of a face."""
-    x, y, z = _twice_area(vertices, a, b, c)
+    x, y, z = twice_area(vertices, a, b, c)
     length = np.sqrt(x * x + y * y + z * z)
     q = 1.0 / length if length > 0.0 else 0.0
     normal[0], normal[1], normal[2], normal[3] = x * q, y * q, z * q, 0.5 * length
@@ -242,7 +236,7 @@ def _begin_batch(given, frame, places, stars, first, last, stride, offset, desk)
         for axis in range(3):
             middle = 0.5 * vertices[a, axis] + 0.5 * vertices[b, axis]
             desk.place[n, axis] = (middle - origin[axis]) * scale
-        desk.place[n, 3], desk.place[n, 4], desk.place[n, 5] = _twice_area(vertices, a, b, c)
+        desk.place[n, 3], desk.place[n, 4], desk.place[n, 5] = twice_area(vertices, a, b, c)
         desk.found[n, 0] = v
         prefetch_row(stars.first, v)
         prefetch_row(places, v)
