@@ -98,6 +98,8 @@ class Engine:
     n_threads : int
     min_faces : int
         So many faces are to be left.
+    shortest_edge : float or None
+        Its length in the mesh given, where it is known.
     is_part : bool
         Whether this is a part of a surface, of which nothing need be told.
 
@@ -123,10 +125,12 @@ class Engine:
         )
         start = start_surface(mesh, self._arranged, options, locked, vertex_block, self.n_threads)
         self._surface, self.topology_before, _, self._on_loops = start
-        self._quadrics = None
+        self._quadrics, self.shortest_edge = None, None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics, self._area = start_quadrics(start, options, arranged_bound, self._crew)
+            self._quadrics, self._area, self.shortest_edge = start_quadrics(
+                start, options, arranged_bound, self._crew
+            )
         self._cost = None
         if not options.has_one_threshold:  # to be ranked first
             self._cost = memory.empty(kernels.cost.COLUMNS * m, np.float32)

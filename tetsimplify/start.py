@@ -131,10 +131,11 @@ def start_quadrics(
     options: Options,
     bound: NDArray[np.float64] | None,
     crew: Crew,
-) -> tuple[Quadrics, float]:
+) -> tuple[Quadrics, float, float]:
     """The quadrics of all faces, and of boundary and feature edges, beside the positions.
 
-    See kernels/quadrics.py. With the area of all faces, in the unit of their weights.
+    See kernels/quadrics.py. With the area of all faces, in the unit of their weights, and the
+    length of the shortest edge.
 
     Parameters
     ----------
@@ -150,24 +151,32 @@ def start_quadrics(
     limit = np.inf if options.max_quadric_error is None else options.max_quadric_error
     quadrics = new_quadrics(n, surface.vertices)
     unit = _weight_unit(surface)
+    planes = memory.empty((len(surface.face_state), 4))
 
-    def sum_faces(part: slice) -> float:
+    def find_planes(part: slice) -> tuple[float, float]:
+        weight, shortest2 = kernels.quadrics.find_planes(
+            surface.vertices, surface.corner_vertex, unit, part.start, part.stop, planes
+        )
+        return weight, shortest2
+
+    def sum_planes(part: slice) -> None:
         largest = limit if bound is None else bound[part]
         quadrics.origin[part, kernels.quadrics.MAX_ERROR2] = largest * np.abs(largest)
-        area: float = kernels.quadrics.sum_faces(
-            *(surface.vertices, surface.corner_vertex, surface.next_corner, first_corner),
-            *(unit, part.start, part.stop, quadrics),
+        kernels.quadrics.sum_planes(
+            *(planes, surface.next_corner, first_corner, part.start, part.stop, quadrics)
         )
-        return area
 
-    area = sum(crew.share(sum_faces, n, AT_ONCE)) / 3.0  # of each face at every corner
+    found = crew.share(find_planes, len(planes), AT_ONCE)
+    crew.share(sum_planes, n, AT_ONCE)
+    area = sum(weight for weight, _ in found)
+    shortest = math.sqrt(min((shortest2 for _, shortest2 in found), default=math.inf))
     sharp = -1.0
     if options.feature_angle is not None:
         sharp = math.cos(math.radians(options.feature_angle))
     begins = on_loops if sharp == -1.0 else np.arange(n)
     weights = unit, BOUNDARY_WEIGHT, FEATURE_WEIGHT
     kernels.quadrics.add_creases(surface, first_corner, begins, quadrics.matrix, *weights, sharp)
-    return quadrics, area
+    return quadrics, area, shortest
 
 
 def _weight_unit(surface: Surface) -> float:

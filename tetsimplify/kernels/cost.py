@@ -35,8 +35,11 @@ from tetsimplify.kernels.state import (
 COLUMNS, LEAST = 4, 3
 COUNTED = 2**10  # faces of a block whose costs tell how many are below a threshold
 AHEAD = 24  # so many edges before they are looked at, what they need is fetched
-# By the state of a face: which of its edges is not to be ranked anew, opposite of what has moved.
-UNCHANGED = (-1,) * MOVED_EVEN + (1, 2, 0, 1, 2, 0)
+# By the state of a face, two bits each: which of its edges is not to be ranked anew, opposite of
+# what has moved, 3 for none. A table in memory, or a choice, would cost a look or a branch.
+UNCHANGED = sum(
+    k << 2 * state for state, k in enumerate((*(3,) * MOVED_EVEN, *(1, 2, 0), *(1, 2, 0)))
+)
 
 
 @part
@@ -110,8 +113,10 @@ def note_least(cost, f):
 
 
 @part
-def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
+def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour, max_cost):
     """Bring the costs of the faces WAITING up to date, but of those that are RANKED or touched.
+
+    Those that are RANKED then and have an edge that costs less than `max_cost` stay WAITING.
 
     Every edge is looked at from one face only, where it begins at its lower vertex. Its other
     corner has an infinite cost. Where the optimum decides, LANES edges are computed side by side.
@@ -122,6 +127,12 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
         How many there are.
     colour : int
         That of the sweep, which tells what it has touched; -1 for none.
+    max_cost : float
+
+    Returns
+    -------
+    int
+        How many stay.
     """
     lists, waiting = scratch.lists, scratch.lists[WAITING]
     n_pending = 0
@@ -131,7 +142,7 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
         if state == RANKED or is_touched(state, colour):
             continue
         surface.face_state[f] = RANKED
-        unchanged = UNCHANGED[state]
+        unchanged = (UNCHANGED >> 2 * np.int64(state)) & 3
         first = np.uint32(3) * f
         a = surface.corner_vertex[first]
         b = surface.corner_vertex[first + np.uint32(1)]
@@ -146,9 +157,16 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour):
         for first in range(0, n_pending, LANES):
             n_edges = min(LANES, n_pending - first)
             _rank_side_by_side(surface, quadrics, rules, cost, lists, first, n_edges, scratch.lanes)
-    for i in range(n_faces):
-        if surface.face_state[waiting[i]] == RANKED:
-            note_least(cost, waiting[i])
+    n_waiting = 0
+    for i in range(n_faces):  # without branches, which nobody could predict
+        f = np.uint32(waiting[i])
+        is_ranked = surface.face_state[f] == RANKED
+        least = cheapest(costs_of(cost, f))[0]
+        place = f * np.uint32(COLUMNS) + np.uint32(LEAST)
+        cost[place] = least if is_ranked else cost[place]
+        waiting[n_waiting] = f
+        n_waiting += is_ranked & (least < max_cost)
+    return n_waiting
 
 
 @part
@@ -244,7 +262,7 @@ def rank(surface, quadrics, rules, cost, scratch, first, last, step):
         for f in range(begin, min(begin + step * AT_ONCE, last), step):
             waiting[n] = f
             n += surface.face_state[f] != SETTLED
-        rank_faces(surface, quadrics, rules, cost, scratch, n, -1)
+        rank_faces(surface, quadrics, rules, cost, scratch, n, -1, 0.0)
 
 
 @kernel_in_place

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetsimplify.kernels.corners import ahead, behind, others
-from tetsimplify.kernels.geometry import twice_area
+from tetsimplify.kernels.geometry import squared_length, twice_area
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across
 from tetsimplify.kernels.state import ERROR
@@ -235,51 +235,74 @@ def mean_area(vertices, corner_vertex, step):
 
 
 @kernel_in_place
-def sum_faces(vertices, corner_vertex, next_corner, first_corner, unit, first, last, quadrics):
+def find_planes(vertices, corner_vertex, unit, first, last, planes):
+    """Find the planes of the faces from `first` to `last`, each once for its three vertices.
+
+    Parameters
+    ----------
+    unit : float
+        Of the weights: areas are counted in it.
+    first, last : int
+    planes : float64 (m, 4), out
+        Unit normals times the root of the weight, and that root.
+
+    Returns
+    -------
+    weight : float
+        Sum of the weights.
+    shortest2 : float
+        Squared length of the shortest edge.
+    """
+    total, shortest2 = 0.0, np.inf
+    for f in range(first, last):
+        corner = np.uint32(3) * np.uint32(f)
+        a = np.uint32(corner_vertex[corner])
+        b = np.uint32(corner_vertex[corner + np.uint32(1)])
+        c = np.uint32(corner_vertex[corner + np.uint32(2)])
+        ab, bc = squared_length(vertices, a, b), squared_length(vertices, b, c)
+        shortest2 = min(shortest2, min(min(ab, bc), squared_length(vertices, c, a)))
+        x, y, z = _area_vector(vertices, a, b, c)
+        area = np.sqrt(x * x + y * y + z * z)
+        root = np.sqrt(area / unit)
+        scale = root / area if area > 0.0 else 0.0
+        plane = planes[np.uint32(f)]
+        plane[0], plane[1], plane[2], plane[3] = scale * x, scale * y, scale * z, root
+        total += area / unit
+    return total, shortest2
+
+
+@kernel_in_place
+def sum_planes(planes, next_corner, first_corner, first, last, quadrics):
     """Sum the planes, the normals and the areas of the faces around the vertices from `first`.
 
     Parameters
     ----------
+    planes : float64 (m, 4)
+        As of `find_planes`.
     first_corner : int32 (n,)
         A corner of each vertex, -1 where it has none.
-    unit : float
-        Of the weights: areas are counted in it.
     first, last : int
         Which vertices.
-
-    Returns
-    -------
-    float
-        Sum of the areas around all these vertices.
     """
-    total = 0.0
     for v in range(first, last):
         matrix, origin = quadrics.matrix[v], quadrics.origin[v]
-        if first_corner[v] < 0:
-            matrix[:] = 0.0
-            origin[NORMAL : AREA + 1] = 0.0
-            continue
         xx = xy = xz = yy = yz = zz = 0.0
         sum_x = sum_y = sum_z = sum_area = 0.0
         c = first_corner[v]
-        while True:
-            a, b = others(corner_vertex, c)
-            x, y, z = _area_vector(vertices, v, np.uint32(a), np.uint32(b))
-            area = np.sqrt(x * x + y * y + z * z)
-            scale = 1.0 / area if area > 0.0 else 0.0
-            xx, xy, xz = xx + scale * x * x, xy + scale * x * y, xz + scale * x * z
-            yy, yz, zz = yy + scale * y * y, yz + scale * y * z, zz + scale * z * z
-            sum_x, sum_y, sum_z, sum_area = sum_x + x, sum_y + y, sum_z + z, sum_area + area
-            c = next_corner[c]
+        while c >= 0:
+            plane = planes[np.uint32(c) // np.uint32(3)]
+            x, y, z, root = plane[0], plane[1], plane[2], plane[3]
+            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+            sum_x, sum_y, sum_z = sum_x + root * x, sum_y + root * y, sum_z + root * z
+            sum_area += root * root
+            c = next_corner[np.uint32(c)]
             if c == first_corner[v]:
                 break
-        matrix[0], matrix[1], matrix[2] = xx / unit, xy / unit, xz / unit
-        matrix[3], matrix[4], matrix[5] = yy / unit, yz / unit, zz / unit
+        matrix[0], matrix[1], matrix[2], matrix[3], matrix[4], matrix[5] = xx, xy, xz, yy, yz, zz
         matrix[6] = matrix[7] = 0.0  # b and c
-        origin[NORMAL], origin[NORMAL + 1] = sum_x / unit, sum_y / unit
-        origin[NORMAL + 2], origin[AREA] = sum_z / unit, sum_area / unit
-        total += sum_area / unit
-    return total
+        origin[NORMAL], origin[NORMAL + 1] = sum_x, sum_y
+        origin[NORMAL + 2], origin[AREA] = sum_z, sum_area
 
 
 @kernel_in_place

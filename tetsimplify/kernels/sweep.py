@@ -261,22 +261,22 @@ def _sweep_run_ranked(
         f = item(listed, i)
         waiting[n_waiting] = f
         n_waiting += least_cost(cost, f) < max_cost
-    rank_faces(surface, quadrics, rules, cost, scratch, n_waiting, colour)
+    n_waiting = rank_faces(
+        surface, quadrics, rules, cost, scratch, n_waiting, colour, max_cost
+    )
     n_contracted = 0
     for i in range(n_waiting):
-        f = waiting[i]
+        f = np.uint32(waiting[i])
         if surface.face_state[f] != RANKED:
             continue
         costs = costs_of(cost, f)
         least, k = cheapest(costs)
-        if least >= max_cost:
-            continue
         if scratch.tally[N_SPARE] < 2:
             break
         _renew_stamps(scratch)
         is_nested = False
         while least < max_cost:
-            corner = 3 * f + k
+            corner = np.uint32(3) * f + np.uint32(k)
             outcome = contract_simple(
                 surface, quadrics, watch, scratch, rules, cost, corner, colour
             )
