@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetsimplify.kernels.geometry import squared_length
-from tetsimplify.kernels.jit import kernel_in_place, part
+from tetsimplify.kernels.jit import cold_part, kernel_in_place, part
 from tetsimplify.kernels.lists import item
 from tetsimplify.kernels.placement import fixed_place, least_error
 from tetsimplify.kernels.prefetch import prefetch_row
@@ -35,11 +35,9 @@ from tetsimplify.kernels.state import (
 COLUMNS, LEAST = 4, 3
 COUNTED = 2**10  # faces of a block whose costs tell how many are below a threshold
 AHEAD = 24  # so many edges before they are looked at, what they need is fetched
-# By the state of a face, two bits each: which of its edges is not to be ranked anew, opposite of
-# what has moved, 3 for none. A table in memory, or a choice, would cost a look or a branch.
-UNCHANGED = sum(
-    k << 2 * state for state, k in enumerate((*(3,) * MOVED_EVEN, *(1, 2, 0), *(1, 2, 0)))
-)
+# By the state of a face, two bits each: the corner of which alone the edges are to be ranked anew, 3
+# for all three. A table in memory, or a choice, would cost a look or a branch.
+MOVED = sum(k << 2 * state for state, k in enumerate((*(3,) * MOVED_EVEN, *(0, 1, 2), *(0, 1, 2))))
 
 
 @part
@@ -142,17 +140,24 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour, max_cos
         if state == RANKED or is_touched(state, colour):
             continue
         surface.face_state[f] = RANKED
-        unchanged = (UNCHANGED >> 2 * np.int64(state)) & 3
+        moved = (MOVED >> 2 * np.int64(state)) & 3
+        k = np.uint32(moved if moved < 3 else 0)
+        k_ahead = np.uint32(k + 1 if k < 2 else 0)
+        k_behind = np.uint32(k - 1 if k > 0 else 2)
         first = np.uint32(3) * f
-        a = surface.corner_vertex[first]
-        b = surface.corner_vertex[first + np.uint32(1)]
-        c = surface.corner_vertex[first + np.uint32(2)]
+        a = surface.corner_vertex[first + k]
+        b = surface.corner_vertex[first + k_ahead]
+        c = surface.corner_vertex[first + k_behind]
         if quadrics is None or not rules.optimum or is_special(surface, a, b, c):
-            _rank_alone(surface, quadrics, rules, cost, f, a, b, c, unchanged)
+            _rank_alone(surface, quadrics, rules, cost, f, k, a, b)
+            _rank_alone(surface, quadrics, rules, cost, f, k_behind, c, a)
+            if moved == 3:
+                _rank_alone(surface, quadrics, rules, cost, f, k_ahead, b, c)
         else:
-            n_pending = _pend(surface, cost, lists, n_pending, f, 0, a, b, unchanged)
-            n_pending = _pend(surface, cost, lists, n_pending, f, 1, b, c, unchanged)
-            n_pending = _pend(surface, cost, lists, n_pending, f, 2, c, a, unchanged)
+            n_pending = _pend(surface, cost, lists, n_pending, f, k, a, b)
+            n_pending = _pend(surface, cost, lists, n_pending, f, k_behind, c, a)
+            if moved == 3:
+                n_pending = _pend(surface, cost, lists, n_pending, f, k_ahead, b, c)
     if quadrics is not None:
         for first in range(0, n_pending, LANES):
             n_edges = min(LANES, n_pending - first)
@@ -178,28 +183,23 @@ def is_special(surface, a, b, c):
 
 
 @part
-def _pend(surface, cost, lists, n, f, k, a, b, unchanged):
-    """Let the edge from the k-th corner of a face wait for its cost, if it is to be ranked."""
-    place = np.uint32(COLUMNS) * f + np.uint32(k)
-    corner = np.uint32(3) * f + np.uint32(k)
-    is_new = k != unchanged
-    cost[place] = np.float32(np.inf) if is_new else cost[place]
-    surface.verdict[corner] = CONTRACTIBLE if is_new else surface.verdict[corner]
+def _pend(surface, cost, lists, n, f, k, a, b):
+    """Let the edge ab from the k-th corner of a face wait for its cost, if it is ranked from there."""
+    place = np.uint32(COLUMNS) * f + k
+    cost[place] = np.inf
+    surface.verdict[np.uint32(3) * f + k] = CONTRACTIBLE
     lists[PENDING, n], lists[PENDING + 1, n], lists[PENDING + 2, n] = place, a, b
-    return n + (is_new & (a < b))
+    return n + (a < b)
 
 
-@part
-def _rank_alone(surface, quadrics, rules, cost, f, a, b, c, unchanged):
-    """Find the costs of the edges of a face, one after the other."""
-    for k in range(3):
-        if k != unchanged:
-            v, u = (a, b) if k == 0 else (b, c) if k == 1 else (c, a)
-            price, verdict = np.inf, CONTRACTIBLE
-            if is_ranked(surface.loop, v, u):
-                price, verdict = _ranked_cost(surface, quadrics, rules, v, u)
-            cost[COLUMNS * f + k] = price
-            surface.verdict[3 * f + k] = verdict
+@cold_part
+def _rank_alone(surface, quadrics, rules, cost, f, k, a, b):
+    """Find the cost of the edge ab from the k-th corner of a face."""
+    price, verdict = np.inf, CONTRACTIBLE
+    if is_ranked(surface.loop, a, b):
+        price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
+    cost[np.uint32(COLUMNS) * f + k] = price
+    surface.verdict[np.uint32(3) * f + k] = verdict
 
 
 @part
