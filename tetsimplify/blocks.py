@@ -111,26 +111,22 @@ def runs(mesh: Mesh, crew: Crew) -> tuple[Cells, Division, NDArray[np.int32]] | 
     return cells, division, vertex_block
 
 
-def copy_live(
-    cells: Cells, corner_vertex: NDArray[np.int32], begin: NDArray[np.int64], crew: Crew
-) -> Cells:
+def copy_live(cells: Cells, source: NDArray[np.int32], crew: Crew) -> Cells:
     """The cells of the faces that are live.
 
     Parameters
     ----------
-    begin : ndarray, shape (n_parts + 1,), int64
-        Where the live faces of each part of PART faces begin.
+    source : ndarray, shape (n,), int32
+        The faces that are live.
     """
-    shifted = cells.shifted
-    if not len(shifted):
+    if not len(cells.shifted):
         return cells
-    live = memory.empty(int(begin[-1]), np.int32)
+    live = memory.empty(len(source), np.int32)
 
     def copy(part: slice) -> None:
-        at = begin[part.start // PART]
-        kernels.blocks.copy_cells(corner_vertex, shifted, part.start, part.stop, at, live)
+        np.take(cells.shifted, source[part], out=live[part])
 
-    crew.share(copy, len(corner_vertex) // 3, PART)
+    crew.share(copy, len(source), PART)
     return cells._replace(shifted=live)
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tetsimplify import blocks, kernels, memory
+from tetsimplify import kernels, memory
+from tetsimplify.blocks import PART
 from tetsimplify.crew import Crew
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ class Compacted(NamedTuple):
     surface: Surface
     cost: NDArray[np.float32] | None
     face_origin: NDArray[np.int32]
-    begin: NDArray[np.int64]
-    """Where the live faces of each part of ``blocks.PART`` faces begin now."""
+    source: NDArray[np.int32]
+    """Shape (n,): where each face was before."""
 
 
 def compact(
@@ -51,25 +52,31 @@ def compact(
         return int(kernels.result.count_live_faces(surface.corner_vertex, part.start, part.stop))
 
     def copy(part: slice) -> None:
+        first, last = (int(begin[k]) for k in (part.start // PART, part.start // PART + 1))
+        kernels.result.list_live_faces(
+            surface.corner_vertex, part.start, part.stop, first, last, place, source
+        )
         kernels.result.copy_live_faces(
-            *(surface, cost, face_origin, part.start, part.stop),
-            *(begin[part.start // blocks.PART], place, live, live_cost, origin),
+            *(surface, cost, face_origin, source, first, last), *(live, live_cost, origin)
         )
 
     def link(part: slice) -> None:
-        kernels.result.copy_links(surface, part.start, part.stop, place, live)
+        kernels.result.copy_links(
+            *(surface.next_corner, source, place, part.start, part.stop), live.next_corner
+        )
 
-    begin = np.cumsum([0, *crew.share(count, m, blocks.PART)], dtype=np.int64)
+    begin = np.cumsum([0, *crew.share(count, m, PART)])
     n = int(begin[-1])
     live_cost = None if cost is None else memory.empty(kernels.cost.COLUMNS * n, np.float32)
-    place, origin = memory.empty(m, np.int32), memory.empty(n, np.int32)
+    place = memory.empty(m, np.int32)
+    source, origin = memory.empty(n, np.int32), memory.empty(n, np.int32)
     live = surface._replace(
         corner_vertex=memory.empty(3 * n, np.int32),
         next_corner=memory.empty(3 * n if linked else 0, np.int32),
         face_state=memory.empty(n, np.uint8),
         verdict=memory.empty(3 * n, np.uint8),
     )
-    crew.share(copy, m, blocks.PART)
+    crew.share(copy, m, PART)
     if linked:
-        crew.share(link, m, blocks.PART)
-    return Compacted(live, live_cost, origin, begin)
+        crew.share(link, n, PART)
+    return Compacted(live, live_cost, origin, source)

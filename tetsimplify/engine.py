@@ -562,9 +562,9 @@ class Engine:
 
     def _compact(self, *, linked: bool = True) -> None:
         """Drop the dead faces. The last time corners need not be linked."""
-        before, crew = self._surface.corner_vertex, self._crew
-        self._surface, self._cost, self._face_origin, begin = compact(
+        crew = self._crew
+        self._surface, self._cost, self._face_origin, source = compact(
             self._surface, self._cost, self._face_origin, crew, linked=linked
         )
         if linked and self._cells is not None:
-            self._cells = blocks.copy_live(self._cells, before, begin, crew)
+            self._cells = blocks.copy_live(self._cells, source, crew)

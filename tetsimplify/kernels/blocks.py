@@ -115,12 +115,3 @@ def find_shared(corner_vertex, cells, block_of, first, last, vertex_block):
                 if vertex_block[v] != block:
                     vertex_block[v] = SHARED
                 corner += np.uint32(1)
-
-
-@kernel_in_place
-def copy_cells(corner_vertex, cell, first, last, n, to):
-    """Copy the cells of the live faces from `first` to `last`, in order, from place `n` on."""
-    for f in range(first, last):
-        if _is_live(corner_vertex, f):
-            to[np.uint32(n)] = cell[np.uint32(f)]
-            n += 1

@@ -19,8 +19,31 @@ def count_live_faces(corner_vertex, first, last):
 
 
 @kernel_in_place
-def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cost, to_origin):
-    """Copy the live ones of the faces from `first` to `last`, but for the links of their corners.
+def list_live_faces(corner_vertex, first, last, begin, end, place, source):
+    """List the live ones of the faces from `first` to `last`, without branches on which they are.
+
+    Parameters
+    ----------
+    begin, end : int
+        Their places in the list.
+    place : int32 (m,), out
+        Where each live face is in the list, -1 for a dead one.
+    source : int32 (n,), out
+        The list.
+    """
+    n = np.uint32(begin)
+    for face in range(first, last):
+        f = np.uint32(face)
+        is_live = corner_vertex[np.uint32(3) * f] != DEAD
+        place[f] = np.int32(n) if is_live else np.int32(-1)
+        if n < end:  # the last ones of the range may be dead
+            source[n] = face
+        n += np.uint32(is_live)
+
+
+@kernel_in_place
+def copy_live_faces(surface, cost, origin, source, first, last, to, to_cost, to_origin):
+    """Copy the live faces from the `first` to the `last`, but for the links of their corners.
 
     Parameters
     ----------
@@ -29,53 +52,51 @@ def copy_live_faces(surface, cost, origin, first, last, begin, place, to, to_cos
         Where costs are kept.
     origin : int32 (m,)
         Number of each face in the mesh given; see lists.py.
-    begin : int
-        How many live faces come before.
-    place : int32 (m,), out
-        Where each live face goes, -1 for a dead one.
+    source : int32 (n,)
+        The live faces.
     to : Surface
         What they are copied to.
     to_cost, to_origin
         The same.
     """
-    n, one = np.uint32(begin), np.uint32(1)
-    for face in range(first, last):
-        f = np.uint32(face)
+    for i in range(first, last):
+        n = np.uint32(i)
+        f = np.uint32(source[n])
         corner, to_corner = np.uint32(3) * f, np.uint32(3) * n
-        is_live = surface.corner_vertex[corner] != DEAD
-        place[f] = np.int32(n) if is_live else -1
-        if not is_live:
-            continue
-        for _ in range(3):
-            to.corner_vertex[to_corner] = surface.corner_vertex[corner]
-            to.verdict[to_corner] = surface.verdict[corner]
-            corner, to_corner = corner + one, to_corner + one
+        for k in range(3):
+            j = np.uint32(k)
+            to.corner_vertex[to_corner + j] = surface.corner_vertex[corner + j]
+            to.verdict[to_corner + j] = surface.verdict[corner + j]
         if cost is not None:
-            place_of_cost, to_place = np.uint32(COLUMNS) * f, np.uint32(COLUMNS) * n
-            for _ in range(COLUMNS):
-                to_cost[to_place] = cost[place_of_cost]
-                place_of_cost, to_place = place_of_cost + one, to_place + one
+            place, to_place = np.uint32(COLUMNS) * f, np.uint32(COLUMNS) * n
+            for k in range(COLUMNS):
+                to_cost[to_place + np.uint32(k)] = cost[place + np.uint32(k)]
         to.face_state[n] = surface.face_state[f]
         to_origin[n] = item(origin, f)
-        n += one
 
 
 @kernel_in_place
-def copy_links(surface, first, last, place, to):
-    """Link the corners of the live ones of the faces from `first` to `last`, in the same order."""
-    next_corner, three = surface.next_corner, np.uint32(3)
-    for face in range(first, last):
-        f = np.uint32(face)
-        if place[f] < 0:
-            continue
-        to_first = three * np.uint32(place[f])
-        for k in range(np.uint32(3)):
-            c = np.uint32(next_corner[three * f + np.uint32(k)])
+def copy_links(next_corner, source, place, first, last, to):
+    """Link the corners of the live faces from the `first` to the `last`, in the same order.
+
+    Parameters
+    ----------
+    next_corner : int32 (3 m,)
+    source, place
+        As of `list_live_faces`.
+    to : int32 (3 n,), out
+    """
+    three = np.uint32(3)
+    for i in range(first, last):
+        corner, to_corner = three * np.uint32(source[np.uint32(i)]), three * np.uint32(i)
+        for k in range(3):
+            c = np.uint32(next_corner[corner + np.uint32(k)])
             while place[c // three] < 0:
                 c = np.uint32(next_corner[c])
             across = c // three
-            to_corner = three * np.uint32(place[across]) + (c - three * across)
-            to.next_corner[to_first + np.uint32(k)] = to_corner
+            to[to_corner + np.uint32(k)] = (
+                three * np.uint32(place[across]) + c - three * across
+            )
 
 
 @kernel_in_place
