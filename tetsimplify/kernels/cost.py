@@ -43,9 +43,10 @@ MOVED = sum(k << 2 * state for state, k in enumerate((*(3,) * MOVED_EVEN, *(0, 1
 @part
 def edge_costs(vertices, corner_vertex, face):
     """Squared lengths of the edges that begin at the three corners of a face."""
-    a = corner_vertex[3 * face]
-    b = corner_vertex[3 * face + 1]
-    c = corner_vertex[3 * face + 2]
+    first = np.uint32(3) * np.uint32(face)
+    a = np.uint32(corner_vertex[first])
+    b = np.uint32(corner_vertex[first + np.uint32(1)])
+    c = np.uint32(corner_vertex[first + np.uint32(2)])
     return (
         squared_length(vertices, a, b),
         squared_length(vertices, b, c),

@@ -147,13 +147,13 @@ def _sweep_run(surface, quadrics, watch, scratch, rules, listed, first, last, co
     """Sweep once over at most AT_ONCE faces."""
     waiting, n_waiting = scratch.lists[WAITING], 0
     for i in range(first, last):  # without branches, which nobody could predict
-        f = item(listed, i)
+        f = np.uint32(item(listed, i))
         state = surface.face_state[f]
         waiting[n_waiting] = f
         n_waiting += (state != SETTLED) & (state != colour) & ((state != BLOCKED) | retry)
     n_contracted = 0
     for i in range(n_waiting):
-        f = waiting[i]
+        f = np.uint32(waiting[i])
         _will_be_walked_from(surface, waiting[min(i + SOON, n_waiting - 1)])
         state = surface.face_state[f]
         if state == SETTLED or state == colour:
@@ -168,7 +168,7 @@ def _sweep_run(surface, quadrics, watch, scratch, rules, listed, first, last, co
         is_nested = False
         is_outside = False
         while least < rules.max_length2:
-            corner = 3 * f + k
+            corner = np.uint32(3) * f + np.uint32(k)
             if state != BLOCKED or surface.verdict[corner] != OBSTRUCTED:
                 outcome = contract_simple(
                     surface, quadrics, watch, scratch, rules, None, corner, colour
