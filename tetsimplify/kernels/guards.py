@@ -38,14 +38,19 @@ def turns_over(surface, scratch, rules, v, u):
     for first in range(0, n_steps, LANES):
         n = min(LANES, n_steps - first)
         _place_ring(surface, scratch, v, u, first, n)
+        n_turning = 0
         for j in range(LANES):
             new2, _, old2, old_sum, _, _, _, dot = _before_and_after(lanes, j)
-            turns = _turns(rules, dot, old2, new2, old_sum)
+            turns = _turns(rules, dot, old2, new2, old_sum) & (j < n)
             lanes[NEW_SHAPE * WIDTH + j] = 1.0 if turns else 0.0
-        _pass_over_gaps(scratch, first, n, NEW_SHAPE, 0.0)
-        for j in range(n):
-            if lanes[NEW_SHAPE * WIDTH + j] != 0.0:
-                return True
+            n_turning += turns
+        if n_turning and scratch.tally[N_GAPS]:
+            _pass_over_gaps(scratch, first, n, NEW_SHAPE, 0.0)
+            n_turning = 0
+            for j in range(n):
+                n_turning += lanes[NEW_SHAPE * WIDTH + j] != 0.0
+        if n_turning:
+            return True
     return False
 
 
