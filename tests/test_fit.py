@@ -35,7 +35,7 @@ def contracted(mesh, **options):
 def fitted(mesh, result, *, held=None, threads=1, **more):
     """What becomes of the vertices of a result that were not fitted, and what was held."""
     made = Mesh(result.vertices, result.faces)
-    _, loop, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
+    _, loop, _, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
     held = (loop >= 0).astype(np.uint8) if held is None else held
     links = Links(first_corner, next_corner)
     return fit_mesh(as_mesh(*mesh), made, result.vertex_map, held, links, threads, **more).vertices
@@ -68,7 +68,7 @@ def assert_faces_kept(before, after, faces, cosine=COS_TURN):
 def started(mesh, result, plan, **held):
     """The state of a fit when it has taken samples."""
     made = Mesh(result.vertices, result.faces)
-    _, _, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
+    _, _, _, next_corner, first_corner = examine(made.faces.reshape(-1), len(made.vertices))
     box = made.vertices.min(axis=0), made.vertices.max(axis=0)
     nobody = np.zeros(len(made.vertices), np.uint8)
     fit = _Fit(made, nobody, Links(first_corner, next_corner), box, Crew(1))

@@ -18,6 +18,7 @@ from corner_tables import assert_engine_in_order
 from test_simplify import assert_maps_fit, assert_remaining_listed, assert_same_topology
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
+from tetsimplify.edges import edge_lengths
 from tetsimplify.engine import Engine
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.cost import COLUMNS, LEAST, _ranked_cost, is_ranked
@@ -104,8 +105,9 @@ def quadrics_of(vertices, faces):
     quadrics.matrix[:] = quadrics.origin[:] = np.nan  # all of it is to be filled
     corner_vertex = mesh.faces.reshape(-1)
     first_corner, next_corner, _ = kernels.corners.link_corners(corner_vertex, n)
-    links = corner_vertex, next_corner, first_corner
-    kernels.quadrics.sum_faces(mesh.vertices, *links, 1.0, 0, n, quadrics)
+    planes = np.full((len(mesh.faces), 4), np.nan)
+    kernels.quadrics.find_planes(mesh.vertices, corner_vertex, 1.0, 0, len(planes), planes)
+    kernels.quadrics.sum_planes(planes, next_corner, first_corner, 0, n, quadrics)
     return quadrics
 
 
@@ -119,6 +121,37 @@ def error_at(quadrics, vertices, v, u, point):
     q = kernels.quadrics.sum_at.py_func(quadrics, vertices, v, u)
     y = point - vertices[v]
     return float(y @ matrix(q) @ y + 2.0 * np.dot(q[6:9], y) + q[9])
+
+
+@pytest.mark.parametrize("scale", [1e-70, 1.0, 1e70])
+def test_planes_of_faces_of_any_size(scale):
+    vertices, faces = meshes.icosphere(2)
+    vertices = vertices * scale
+    faces = np.vstack([faces, [[3, 3, 5]]]).astype(np.int32)  # and one without an area
+    planes = np.full((len(faces), 4), np.nan)
+    weight, shortest2 = kernels.quadrics.find_planes(
+        vertices, faces.reshape(-1), scale**2, 0, len(faces), planes
+    )
+    normal = np.cross(*(vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2)))
+    area = 0.5 * np.linalg.norm(normal, axis=1) / scale**2
+    assert weight == pytest.approx(area.sum())
+    assert shortest2 == 0.0  # of the last face
+    assert planes[:, 3] ** 2 == pytest.approx(area)
+    assert planes[:-1, :3] ** 2 == pytest.approx(
+        (normal / np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-300))[:-1] ** 2
+        * area[:-1, None]
+    )
+    assert not planes[-1].any()
+
+
+def test_the_shortest_edge_is_told_by_error_as_by_length():
+    vertices, faces = meshes.icosphere(3)
+    vertices = vertices + 0.01 * np.random.default_rng(0).random(vertices.shape)
+    by_error, by_length = (
+        tetsimplify.simplify(vertices, faces, **criterion).report.shortest_edge_before
+        for criterion in ({"keep_ratio": 0.5}, {"max_edge_length": 0.1})
+    )
+    assert by_error == by_length == edge_lengths(as_mesh(vertices, faces)).min()
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e6])

@@ -160,17 +160,18 @@ def threads_for_all(monkeypatch):
 
 def as_bytes(examined):
     """All that is found, to the last bit."""
-    report, loop, next_corner, _ = examined
+    report = examined.report
     fields = {
         name: value.tobytes() if isinstance(value, np.ndarray) else value
         for name, value in dataclasses.asdict(report).items()
     }
-    return fields, loop.tobytes(), next_corner.tobytes()
+    return fields, *(part.tobytes() for part in (examined.loop, examined.next_corner))
 
 
 def assert_linked(corner_vertex, examined):
     """All corners of a vertex form one circle, in a manifold anticlockwise with a gap at most."""
-    report, loop, next_corner, first_corner = examined
+    report, loop, on_loops, next_corner, first_corner = examined
+    assert on_loops.tolist() == np.flatnonzero(loop >= 0).tolist()
     if report.is_manifold:
         assert_in_order(corner_vertex, next_corner, loop >= 0)
     valence = np.bincount(corner_vertex, minlength=len(first_corner))

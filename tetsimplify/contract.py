@@ -123,7 +123,8 @@ def _fitted(
     options, made = engine.options, Mesh(result.vertices, result.faces)
     if options.fit is not True and not pays(mesh, made):
         return result
-    held = (examined.loop >= 0).astype(np.uint8)
+    held = np.zeros(len(made.vertices), np.uint8)
+    held[examined.on_loops] = 1
     kept = result.vertex_map[locked]
     held[kept[kept >= 0]] = 1
     fitted = fit_mesh(

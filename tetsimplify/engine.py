@@ -398,7 +398,7 @@ class Engine:
         on_loops = self._vertices_on_loops()
         kernels.loops.count_loop_edges(on_loops, surface.loop, surface.loop_size)
 
-    def _vertices_on_loops(self) -> NDArray[np.intp]:
+    def _vertices_on_loops(self) -> NDArray[np.int32]:
         """The boundary vertices that are left."""
         n = kernels.loops.follow_merges(self._surface.merged_into, self._on_loops)
         self._on_loops = self._on_loops[:n]

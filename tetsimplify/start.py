@@ -34,7 +34,7 @@ class Start(NamedTuple):
     topology: TopologyReport
     first_corner: NDArray[np.int32]
     """Shape (n,): a corner of each vertex, -1 where it has none."""
-    on_loops: NDArray[np.intp]
+    on_loops: NDArray[np.int32]
     """The boundary vertices."""
 
 
@@ -69,7 +69,7 @@ def start_surface(
     """
     vertices, corner_vertex = arranged.vertices, arranged.faces.reshape(-1)
     n, m = len(vertices), len(arranged.faces)
-    report, loop, next_corner, first_corner = examine(corner_vertex, n, threads=threads)
+    report, loop, on_loops, next_corner, first_corner = examine(corner_vertex, n, threads=threads)
     if not report.is_manifold:
         defects = topology(*given).defects()  # which are told in the order given
         raise MeshError(
@@ -78,7 +78,6 @@ def start_surface(
     unused = np.sort(arranged.vertex_origin[report.unreferenced_vertices])
     report = dataclasses.replace(report, unreferenced_vertices=unused)
 
-    on_loops = np.flatnonzero(loop >= 0)
     held = memory.full(n, 0, np.uint8)
     if locked.any():
         held[:] = locked[arranged.vertex_origin]
@@ -109,7 +108,7 @@ def _is_held(
     corner_vertex: NDArray[np.int32],
     next_corner: NDArray[np.int32],
     loop: NDArray[np.int32],
-    on_loops: NDArray[np.intp],
+    on_loops: NDArray[np.int32],
     boundary: str,
 ) -> NDArray[np.bool_]:
     """Which boundary vertices have to stay: all, or those where the boundary turns."""

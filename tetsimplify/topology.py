@@ -150,6 +150,8 @@ class Examined(NamedTuple):
     report: TopologyReport
     loop: Indices
     """Shape (n,): the number of the boundary loop of each vertex, -1 inside."""
+    on_loops: Indices
+    """Shape (k,): the boundary vertices."""
     next_corner: Indices
     """Shape (3 m,): the corner table, see `kernels.corners`."""
     first_corner: Indices
@@ -169,15 +171,15 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
     """
     crew = Crew(threads)
     n_threads = crew.n_threads if len(corner_vertex) > 3 * LEAST_FACES else 1
-    numbers = [memory.empty(n_vertices, np.int32) for _ in range(5)]
-    first_corner, component, euler, loop, lower = numbers
+    numbers = [memory.empty(n_vertices, np.int32) for _ in range(6)]
+    first_corner, component, euler, loop, listed, lower = numbers
     found = kernels.surface.Survey(
         first_corner=first_corner,
         next_corner=memory.empty(len(corner_vertex), np.int32),
         component=component,
         euler=euler,
         loop=loop,
-        left=memory.empty(n_vertices, np.uint8),
+        listed=listed,
         lower=lower,
     )
 
@@ -190,13 +192,19 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
         )
         return counts
 
-    counts = crew.share(survey, n_vertices, max(1, -(-n_vertices // n_threads)))
-    n_edges, n_left = (sum(part[k] for part in counts) for k in range(2))
+    def note_special(part: slice) -> int:
+        return int(
+            kernels.surface.list_special(component, loop, part.start, part.stop, found.listed)
+        )
+
+    at_once = max(1, -(-n_vertices // n_threads))
+    counts = crew.share(survey, n_vertices, at_once)
+    n_edges = sum(part[0] for part in counts)
+    rest = _joined(listed, at_once, [part[1] for part in counts])
     longest = max((part[2] for part in counts), default=0)
     n_boundary = n_degenerate = 0
     defects = kernels.defects.none()
-    if n_left:
-        rest = np.flatnonzero(found.left != kernels.surface.SETTLED).astype(np.int32)
+    if len(rest):
         arcs, slot = np.empty((4, longest + 1), np.int32), memory.empty(n_vertices, np.int32)
         n_more, n_boundary, n_degenerate, n_irregular = kernels.surface.survey_rest(
             corner_vertex, found, rest, arcs, slot
@@ -205,13 +213,22 @@ def examine(corner_vertex: Indices, n_vertices: int, *, threads: int | None = No
         if n_irregular:
             irregular = rest[:n_irregular]
             defects = kernels.defects.inspect(corner_vertex, found, irregular, longest)
-    report = _report(corner_vertex, found, defects, n_edges, n_boundary, n_degenerate)
-    return Examined(report, found.loop, found.next_corner, found.first_corner)
+    special = _joined(listed, at_once, crew.share(note_special, n_vertices, at_once))
+    report = _report(corner_vertex, found, special, defects, n_edges, n_boundary, n_degenerate)
+    on_loops = special[loop[special] >= 0]
+    return Examined(report, loop, on_loops, found.next_corner, first_corner)
+
+
+def _joined(listed: Indices, at_once: int, counts: list[int]) -> Indices:
+    """The first few items, so many each, of parts of a list."""
+    parts = [listed[i * at_once : i * at_once + n] for i, n in enumerate(counts)]
+    return np.concatenate(parts) if parts else np.empty(0, np.int32)
 
 
 def _report(
     corner_vertex: Indices,
     found: Any,
+    special: Indices,
     defects: Any,
     n_edges: int,
     n_boundary_edges: int,
@@ -220,9 +237,9 @@ def _report(
     """Put the report together, and number the boundary loops in `found`."""
     n_edges += defects.n_edges
     n_boundary_edges += defects.n_boundary_edges
-    n_loops = kernels.surface.number_loops(found.loop) if n_boundary_edges else 0
+    n_loops = kernels.surface.number_loops(found.loop, special) if n_boundary_edges else 0
     components = kernels.surface.component_topology(
-        found.component, found.euler, found.loop, n_loops
+        found.component, found.euler, found.loop, n_loops, special
     )
     degenerate = np.empty(0, np.int32)
     if n_degenerate:
@@ -250,5 +267,5 @@ def _report(
         inconsistent_edges=defects.inconsistent_edges[: defects.n_inconsistent_edges],
         duplicate_faces=np.sort(defects.duplicate_faces[: defects.n_duplicate_faces]),
         degenerate_faces=degenerate,
-        unreferenced_vertices=np.flatnonzero(found.component < 0).astype(np.int32),
+        unreferenced_vertices=special[found.component[special] < 0],
     )

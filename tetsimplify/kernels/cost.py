@@ -35,8 +35,8 @@ from tetsimplify.kernels.state import (
 COLUMNS, LEAST = 4, 3
 COUNTED = 2**10  # faces of a block whose costs tell how many are below a threshold
 AHEAD = 24  # so many edges before they are looked at, what they need is fetched
-# By the state of a face, two bits each: the corner of which alone the edges are to be ranked anew, 3
-# for all three. A table in memory, or a choice, would cost a look or a branch.
+# By the state of a face, two bits each: the corner whose two edges are to be ranked anew, or 3 for
+# all edges. A table in memory, or a choice, would cost a look or a branch.
 MOVED = sum(k << 2 * state for state, k in enumerate((*(3,) * MOVED_EVEN, *(0, 1, 2), *(0, 1, 2))))
 
 
@@ -185,7 +185,7 @@ def is_special(surface, a, b, c):
 
 @part
 def _pend(surface, cost, lists, n, f, k, a, b):
-    """Let the edge ab from the k-th corner of a face wait for its cost, if it is ranked from there."""
+    """Let the edge ab from the k-th corner of a face wait, if it is ranked from there."""
     place = np.uint32(COLUMNS) * f + k
     cost[place] = np.inf
     surface.verdict[np.uint32(3) * f + k] = CONTRACTIBLE

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetsimplify.kernels.corners import ahead, behind, others
+from tetsimplify.kernels.corners import ahead, behind
 from tetsimplify.kernels.geometry import squared_length, twice_area
 from tetsimplify.kernels.jit import kernel_in_place, part
 from tetsimplify.kernels.rings import face_across

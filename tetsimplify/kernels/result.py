@@ -94,9 +94,7 @@ def copy_links(next_corner, source, place, first, last, to):
             while place[c // three] < 0:
                 c = np.uint32(next_corner[c])
             across = c // three
-            to[to_corner + np.uint32(k)] = (
-                three * np.uint32(place[across]) + c - three * across
-            )
+            to[to_corner + np.uint32(k)] = three * np.uint32(place[across]) + c - three * across
 
 
 @kernel_in_place

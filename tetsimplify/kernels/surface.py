@@ -20,12 +20,13 @@ import numpy as np
 
 from tetsimplify.kernels.corners import others
 from tetsimplify.kernels.jit import kernel, kernel_in_place, part
+from tetsimplify.kernels.prefetch import prefetch_row
 from tetsimplify.kernels.sets import find, unite
 
 CYCLE, PATH, IRREGULAR = 1, 0, -1
-SETTLED, LEFT, ACROSS = 0, 1, 2  # in `left`
 MOST_ARCS = 64  # of a vertex, more are left
 SLOTS = 2**12  # for the tails of arcs, by the last bits of their numbers: they fit a cache
+SOON = 8  # so many vertices before one of the rest is looked at, what it needs is fetched
 RUN = 2**12  # corners that are passed over at once where none has a vertex of the range
 
 
@@ -37,7 +38,8 @@ class Survey(NamedTuple):
     component: np.ndarray  # int32 (n,): disjoint sets of vertices, -1 where unreferenced
     euler: np.ndarray  # int32 (n,): Euler characteristic, at the root of each component
     loop: np.ndarray  # int32 (n,): disjoint sets of boundary vertices, -1 inside
-    left: np.ndarray  # uint8 (n,): LEFT where the vertex is, ACROSS where `lower` is
+    listed: np.ndarray  # int32 (n,): from the first place of each range on, vertices of it: first
+    # those that are left, ~v where that is only to join `lower`; in the end the special ones
     lower: np.ndarray  # int32 (n,): a vertex of another range and the same component
 
 
@@ -159,7 +161,7 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
     longest : int
         The largest number of corners of a vertex.
     """
-    first_corner, next_corner, left = found.first_corner, found.next_corner, found.left
+    first_corner, next_corner, left = found.first_corner, found.next_corner, found.listed
     component, euler = found.component, found.euler
     tail, head, corners = arcs[0], arcs[1], arcs[2]
     entry, successor, entered = slots[0], slots[1], slots[2]
@@ -170,7 +172,6 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
         component[v] = v
         euler[v] = 0
         found.loop[v] = -1
-        left[v] = SETTLED
         corner = first_corner[v]
         if corner < 0:
             component[v] = -1
@@ -231,13 +232,13 @@ def survey_inside(corner_vertex, first, last, found, arcs, slots):
             for i in range(n_arcs):
                 is_cycle &= not (tail[i] < first and head[i] > v)
         if not is_cycle:
-            left[v] = LEFT
+            left[first + n_left] = v
             n_left += 1
             continue
         euler[v] = 1 - n_edges_here + n_faces_here
         n_edges += n_edges_here
         if n_runs == 1 and lower < first:
-            left[v] = ACROSS
+            left[first + n_left] = ~v
             found.lower[v] = lower
             n_left += 1
         elif n_runs == 1:
@@ -259,7 +260,7 @@ def survey_rest(corner_vertex, found, rest, arcs, slot):
     found : Survey
         Completed, but for the edges of irregular vertices.
     rest : int32 (k,)
-        The vertices that are not SETTLED. Receives those whose link is no cycle and no path.
+        These, as in `listed`. Receives those whose link is no cycle and no path.
     arcs : int32 (4, longest + 1)
         Working memory for the largest number of corners of a vertex.
     slot : int32 (n,)
@@ -280,9 +281,12 @@ def survey_rest(corner_vertex, found, rest, arcs, slot):
     component, euler = found.component, found.euler
     tail, head, corners, successor = arcs[0], arcs[1], arcs[2], arcs[3]
     n_edges = n_boundary = n_degenerate = n_irregular = 0
-    for v in rest:
-        if found.left[v] == ACROSS:
-            join_component(component, euler, v, found.lower[v])
+    for i in range(rest.size):
+        soon, later = min(i + SOON, rest.size - 1), min(i + 2 * SOON, rest.size - 1)
+        _will_be_surveyed(corner_vertex, found, slot, rest[soon], rest[later])
+        v = rest[i]
+        if v < 0:
+            join_component(component, euler, ~v, found.lower[~v])
             continue
         n_arcs, n_corners = link_arcs(
             corner_vertex, next_corner, found.first_corner[v], tail, head, corners
@@ -315,6 +319,18 @@ def survey_rest(corner_vertex, found, rest, arcs, slot):
             if kind != CYCLE and head[i] < v:
                 join_component(component, euler, v, head[i])
     return n_edges, n_boundary, n_degenerate, n_irregular
+
+
+@part
+def _will_be_surveyed(corner_vertex, found, slot, v, later):
+    """Start to fetch what a vertex of the rest will need soon, and what another one will later."""
+    if v >= 0:
+        corner = found.first_corner[v]
+        prefetch_row(found.next_corner, corner)
+        prefetch_row(corner_vertex, corner)
+        prefetch_row(slot, v)
+    if later >= 0:
+        prefetch_row(found.first_corner, later)
 
 
 @part
@@ -354,13 +370,38 @@ def join_loop(loop, v, w):
 
 
 @kernel_in_place
-def number_loops(loop):
+def list_special(component, loop, first, last, listed):
+    """List vertices that stand for a component, are on the boundary, or are not in use.
+
+    Parameters
+    ----------
+    component, loop : int32 (n,)
+        As of `Survey`.
+    first, last : int
+        Which vertices.
+    listed : int32 (n,), out
+        From `first` on.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
+    n = 0
+    for v in range(first, last):
+        listed[first + n] = v
+        n += (component[v] == v) | (component[v] < 0) | (loop[v] >= 0)
+    return n
+
+
+@kernel_in_place
+def number_loops(loop, special):
     """Replace each boundary vertex's set by the number of its loop; return their number.
 
-    Loops are numbered in the order of their lowest vertices.
+    Loops are numbered in the order of their lowest vertices. `special` has all boundary vertices.
     """
     n_loops = 0
-    for v in range(loop.size):
+    for v in special:
         if loop[v] == v:  # representatives are the lowest, so none before was touched
             loop[v] = -2 - n_loops
             n_loops += 1
@@ -369,24 +410,24 @@ def number_loops(loop):
             while w >= 0 and loop[w] >= 0:
                 w = loop[w]
             loop[v] = loop[w]
-    for v in range(loop.size):
+    for v in special:
         if loop[v] < -1:
             loop[v] = -2 - loop[v]
     return n_loops
 
 
 @kernel
-def component_topology(component, euler, loop, n_loops):
+def component_topology(component, euler, loop, n_loops, special):
     """Euler characteristic and number of boundary loops of each component."""
     number = np.empty(component.size, np.int32)
     n_components = 0
-    for v in range(component.size):
+    for v in special:
         if component[v] == v:
             number[v] = n_components
             n_components += 1
     table = np.zeros((n_components, 2), np.int64)
     counted = np.zeros(n_loops, np.bool_)
-    for v in range(component.size):
+    for v in special:
         if component[v] < 0:
             continue
         if component[v] == v:

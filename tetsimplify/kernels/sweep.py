@@ -261,9 +261,7 @@ def _sweep_run_ranked(
         f = item(listed, i)
         waiting[n_waiting] = f
         n_waiting += least_cost(cost, f) < max_cost
-    n_waiting = rank_faces(
-        surface, quadrics, rules, cost, scratch, n_waiting, colour, max_cost
-    )
+    n_waiting = rank_faces(surface, quadrics, rules, cost, scratch, n_waiting, colour, max_cost)
     n_contracted = 0
     for i in range(n_waiting):
         f = np.uint32(waiting[i])
