@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.locality import IN_ORDER, Arrangement
 from tetsimplify.mesh import Mesh
 
@@ -26,7 +26,6 @@ RUN = 2**16  # faces in a block of faces as they are given, at least: few of the
 LONGEST_RUN, N_RUNS = 2**17, 16  # and fewer of longer ones, where there are enough to share
 CELL_BITS = 10  # blocks are made of cells of about 2**10 faces
 AT_ONCE = 4  # blocks of FACES in a task for a thread, at most
-PART = 2**17  # faces in a part, where what is done with them does not depend on the parts
 MOST_SHARED = 0.2  # of the vertices of runs may be between them
 UNLIMITED = 2**62  # faces that may go
 MOST_BITS = 7  # of the cells along an axis
@@ -87,10 +86,10 @@ def two_ways(arranged: Arrangement, crew: Crew) -> Cells:
     def renumber(part: slice) -> None:
         kernels.order.renumber(number, part.start, part.stop, shifted)
 
-    crew.share(find, n, PART)
-    crew.share(take, m, PART)
+    crew.share(find, n, part_size(n))
+    crew.share(take, m, part_size(m))
     n_shifted = int(kernels.order.number_cells(number))
-    crew.share(renumber, m, PART)
+    crew.share(renumber, m, part_size(m))
     return Cells(shifted, n_shifted, FACES, (FACES, FACES), AT_ONCE)
 
 
@@ -126,7 +125,7 @@ def copy_live(cells: Cells, source: NDArray[np.int32], crew: Crew) -> Cells:
     def copy(part: slice) -> None:
         np.take(cells.shifted, source[part], out=live[part])
 
-    crew.share(copy, len(source), PART)
+    crew.share(copy, len(source), part_size(len(source)))
     return cells._replace(shifted=live)
 
 
@@ -154,11 +153,12 @@ def divide(
     cell, m = cells.shifted if way else IN_ORDER, len(corner_vertex) // 3
     of_faces, are_runs = (cell, CELL_BITS), not len(cell)
     n_cells = (m >> CELL_BITS) + 1 if are_runs else cells.n_curve
-    n_faces = np.zeros((-(-m // PART), n_cells), np.int32)
+    at_once = part_size(m)
+    n_faces = np.zeros((-(-m // at_once), n_cells), np.int32)
     block_of, first_cell = np.empty(n_cells, np.int32), np.empty(n_cells + 1, np.int32)
 
     def count(part: slice) -> None:
-        row = n_faces[part.start // PART]
+        row = n_faces[part.start // at_once]
         kernels.blocks.count_live(corner_vertex, of_faces, part.start, part.stop, row)
 
     def note(part: slice) -> None:
@@ -172,25 +172,25 @@ def divide(
         )
 
     def put(part: slice) -> None:
-        row = place[part.start // PART]
+        row = place[part.start // at_once]
         kernels.blocks.list_faces(
             corner_vertex, of_faces, block_of, part.start, part.stop, row, room
         )
 
-    crew.share(count, m, PART)
+    crew.share(count, m, at_once)
     n_blocks = kernels.blocks.put_in_blocks(
         n_faces, (cells.first[way], cells.least), block_of, first_cell
     )
     first_cell = first_cell[: n_blocks + 1]
-    crew.share(note, m, PART)
-    crew.share(find_shared, m, PART)
+    crew.share(note, m, at_once)
+    crew.share(find_shared, m, at_once)
     in_order = are_runs and n_faces.sum() > FEW_DEAD * m
     if in_order:
         begin = np.minimum(first_cell.astype(np.int64) << CELL_BITS, m)
     else:
         begin, place = np.empty(n_blocks + 1, np.int64), np.empty_like(n_faces)
         kernels.blocks.place_in_list(n_faces, first_cell, place, begin)
-        crew.share(put, m, PART)
+        crew.share(put, m, at_once)
 
     blocks = np.empty((n_blocks, 4), np.int64)
     blocks[:, 0], blocks[:, 1] = begin[:-1], begin[1:]

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
-from tetsimplify.blocks import PART
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.state import Surface
@@ -52,7 +51,8 @@ def compact(
         return int(kernels.result.count_live_faces(surface.corner_vertex, part.start, part.stop))
 
     def copy(part: slice) -> None:
-        first, last = (int(begin[k]) for k in (part.start // PART, part.start // PART + 1))
+        which = part.start // at_once
+        first, last = int(begin[which]), int(begin[which + 1])
         kernels.result.list_live_faces(
             surface.corner_vertex, part.start, part.stop, first, last, place, source
         )
@@ -65,7 +65,8 @@ def compact(
             *(surface.next_corner, source, place, part.start, part.stop), live.next_corner
         )
 
-    begin = np.cumsum([0, *crew.share(count, m, PART)])
+    at_once = part_size(m)
+    begin = np.cumsum([0, *crew.share(count, m, at_once)])
     n = int(begin[-1])
     live_cost = None if cost is None else memory.empty(kernels.cost.COLUMNS * n, np.float32)
     place = memory.empty(m, np.int32)
@@ -76,7 +77,7 @@ def compact(
         face_state=memory.empty(n, np.uint8),
         verdict=memory.empty(3 * n, np.uint8),
     )
-    crew.share(copy, m, PART)
+    crew.share(copy, m, at_once)
     if linked:
-        crew.share(link, n, PART)
+        crew.share(link, n, part_size(n))
     return Compacted(live, live_cost, origin, source)

@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.mesh import Mesh
-
-AT_ONCE = 2**17  # faces in a task for a thread
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
@@ -42,7 +40,7 @@ def edge_extremes(mesh: Mesh, crew: Crew) -> tuple[float, float]:
         )
         return float(shortest), float(longest)
 
-    found = crew.share(find, len(mesh.faces), AT_ONCE)
+    found = crew.share(find, len(mesh.faces), part_size(len(mesh.faces)))
     return min((pair[0] for pair in found), default=np.inf), max(
         (pair[1] for pair in found), default=0.0
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tetsimplify import blocks, kernels, memory
 from tetsimplify.compaction import compact
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.data import VertexWeights
 from tetsimplify.desks import Desks, Done, add_up
 from tetsimplify.edges import edge_extremes
@@ -261,17 +261,18 @@ class Engine:
 
     def rank(self) -> None:
         """Bring the costs of the edges up to date."""
-        self._rank(1, blocks.PART)
+        self._rank(1)
 
-    def _rank(self, step: int, at_once: int) -> None:
-        """Bring the costs of every so many-th face up to date, some of them in a task."""
+    def _rank(self, step: int) -> None:
+        """Bring the costs of every so many-th face up to date."""
         bundles, n_faces = (self._surface, self._quadrics, self.rules, self._cost), self._n_rows
 
         def task(part: slice) -> None:
             last = min(part.stop * step, n_faces)
             kernels.cost.rank(*bundles, start_scratch(0, 0, 0), part.start * step, last, step)
 
-        self._crew.share(task, -(-n_faces // step), at_once)
+        n_ranked = -(-n_faces // step)
+        self._crew.share(task, n_ranked, part_size(n_ranked))
 
     def sweep_ranked(
         self,
@@ -357,7 +358,7 @@ class Engine:
         assert self._cost is not None
         n_faces = self._n_rows
         step = max(1, n_faces // SAMPLE)
-        self._rank(step, blocks.PART // step)
+        self._rank(step)
         is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
         costs = self._cost.reshape(-1, kernels.cost.COLUMNS)[::step, :3][is_ranked]
         return np.sort(costs[costs < np.inf])

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.mesh import Mesh
 
 IN_ORDER = np.empty(0, np.int32)  # a list of numbers that are all there in order
-PART = 2**17  # vertices or faces in a task for a thread
 GROUP_BITS = 17  # faces are sorted by so many groups of their first vertices, at most
 
 
@@ -52,8 +51,8 @@ def as_given(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangement:
     def copy_faces(part: slice) -> None:
         faces[part] = mesh.faces[part]
 
-    crew.share(copy_vertices, n, PART)
-    crew.share(copy_faces, m, PART)
+    crew.share(copy_vertices, n, part_size(n))
+    crew.share(copy_faces, m, part_size(m))
     return Arrangement(vertices, faces, numbers, numbers, IN_ORDER)
 
 
@@ -86,7 +85,7 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
             *(begin, face_origin, faces),
         )
 
-    crew.share(number, n, PART)
+    crew.share(number, n, part_size(n))
     _sort(count, sort, m, 2**GROUP_BITS, crew)
     return Arrangement(vertices, faces, vertex_origin, vertex_place, face_origin, box)
 
@@ -103,7 +102,7 @@ def _sorted_along_curve(
     def find(part: slice) -> None:
         kernels.order.find_codes(vertices, low, scale, part.start, part.stop, given)
 
-    crew.share(find, len(vertices), PART)
+    crew.share(find, len(vertices), part_size(len(vertices)))
     _sort_by_digit(given, 0, sorted_once, crew)
     _sort_by_digit(sorted_once, kernels.order.DIGIT, given, crew)
     return given

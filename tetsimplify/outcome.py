@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
-from tetsimplify.blocks import PART
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.locality import Arrangement
 from tetsimplify.mesh import Mesh
 
@@ -59,8 +58,8 @@ def collect(surface: Surface, arranged: Arrangement, face_origin: Indices, crew:
     def renumber(part: slice) -> None:
         kernels.result.renumber_corners(number, faces[part].reshape(-1))
 
-    crew.share(copy, len(number), PART)
-    crew.share(renumber, len(faces), PART)
+    crew.share(copy, len(number), part_size(len(number)))
+    crew.share(renumber, len(faces), part_size(len(faces)))
     return Outcome(Mesh(vertices, faces), vertex_map, face_map, number)
 
 
@@ -78,11 +77,12 @@ def _new_numbers(surface: Surface, arranged: Arrangement, crew: Crew) -> tuple[I
         return int(np.count_nonzero(is_used[visit[part]]))
 
     def give(part: slice) -> None:
-        kernels.result.number_vertices(visit[part], is_used, begin[part.start // PART], number)
+        kernels.result.number_vertices(visit[part], is_used, begin[part.start // at_once], number)
 
-    crew.share(mark, len(surface.face_state), PART)
-    begin = np.cumsum([0, *crew.share(count, n, PART)])
-    crew.share(give, n, PART)
+    n_faces, at_once = len(surface.face_state), part_size(n)
+    crew.share(mark, n_faces, part_size(n_faces))
+    begin = np.cumsum([0, *crew.share(count, n, at_once)])
+    crew.share(give, n, at_once)
     return number, int(begin[-1])
 
 
@@ -106,15 +106,16 @@ def _faces_given(
         return int(np.count_nonzero(place[part] >= 0))
 
     def copy(part: slice) -> None:
-        first = begin[part.start // PART]
+        first = begin[part.start // at_once]
         kernels.result.copy_in_order(
             surface.corner_vertex, place[part], part.start, first, faces, face_map
         )
 
-    crew.share(clear, m, PART)
-    crew.share(note, n, PART)
-    begin = np.cumsum([0, *crew.share(count, m, PART)])
-    crew.share(copy, m, PART)
+    at_once = part_size(m)
+    crew.share(clear, m, at_once)
+    crew.share(note, n, part_size(n))
+    begin = np.cumsum([0, *crew.share(count, m, at_once)])
+    crew.share(copy, m, at_once)
     return faces, face_map
 
 
@@ -127,5 +128,5 @@ def vertex_errors(
     def find(part: slice) -> None:
         kernels.quadrics.vertex_errors(quadrics, number, part.start, part.stop, errors)
 
-    crew.share(find, len(number), PART)
+    crew.share(find, len(number), part_size(len(number)))
     return errors

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tetsimplify import kernels, memory
-from tetsimplify.crew import Crew
+from tetsimplify.crew import Crew, part_size
 from tetsimplify.errors import MeshError
 from tetsimplify.locality import Arrangement
 from tetsimplify.mesh import Mesh
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 STAMP_LIMIT = 2**30  # stamps are int32; they start anew beyond this
 SAMPLE = 2**12  # faces whose areas tell the unit of the weights
-AT_ONCE = 2**16  # vertices in a task for a thread
 STRAIGHT = 1e-6  # tangent of the angle by which a straight boundary may turn at a vertex
 
 
@@ -165,8 +164,8 @@ def start_quadrics(
             *(planes, surface.next_corner, first_corner, part.start, part.stop, quadrics)
         )
 
-    found = crew.share(find_planes, len(planes), AT_ONCE)
-    crew.share(sum_planes, n, AT_ONCE)
+    found = crew.share(find_planes, len(planes), part_size(len(planes)))
+    crew.share(sum_planes, n, part_size(n))
     area = sum(weight for weight, _ in found)
     shortest = math.sqrt(min((shortest2 for _, shortest2 in found), default=math.inf))
     sharp = -1.0
