@@ -359,9 +359,9 @@ class Engine:
         n_faces = self._n_rows
         step = max(1, n_faces // SAMPLE)
         self._rank(step)
-        is_ranked = self._surface.face_state[::step] == kernels.state.RANKED
-        costs = self._cost.reshape(-1, kernels.cost.COLUMNS)[::step, :3][is_ranked]
-        return np.sort(costs[costs < np.inf])
+        costs = np.empty(3 * -(-n_faces // step), np.float32)
+        n = kernels.cost.collect_costs(self._cost, self._surface.face_state, step, costs)
+        return np.sort(costs[:n])
 
     def forget_refusals(self) -> None:
         """Let all edges be ranked and tried again."""

@@ -13,7 +13,8 @@ from tetsimplify.crew import Crew, part_size
 from tetsimplify.mesh import Mesh
 
 IN_ORDER = np.empty(0, np.int32)  # a list of numbers that are all there in order
-GROUP_BITS = 17  # faces are sorted by so many groups of their first vertices, at most
+GROUP_BITS, LEAST_GROUP = 17, 3  # faces are sorted by groups of their first vertices: 2**17 groups
+# at most, of 2**3 vertices or more
 
 
 class Arrangement(NamedTuple):
@@ -68,7 +69,7 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
     vertex_origin, vertex_place = memory.empty(n, np.int32), memory.empty(n, np.int32)
     face_origin = memory.empty(m, np.int32)
     vertices, faces = _room(n, in_lines), memory.empty((m, 3), np.int32)
-    shift = max(0, n.bit_length() - GROUP_BITS)
+    shift = max(LEAST_GROUP, n.bit_length() - GROUP_BITS)
 
     def number(part: slice) -> None:
         kernels.order.number_in_order(
@@ -86,7 +87,7 @@ def by_locality(mesh: Mesh, crew: Crew, *, in_lines: bool = False) -> Arrangemen
         )
 
     crew.share(number, n, part_size(n))
-    _sort(count, sort, m, 2**GROUP_BITS, crew)
+    _sort(count, sort, m, ((n - 1) >> shift) + 1, crew)
     return Arrangement(vertices, faces, vertex_origin, vertex_place, face_origin, box)
 
 

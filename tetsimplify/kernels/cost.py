@@ -267,6 +267,34 @@ def rank(surface, quadrics, rules, cost, scratch, first, last, step):
 
 
 @kernel_in_place
+def collect_costs(cost, face_state, step, costs):
+    """Collect the costs of the edges of every so many-th face that may be contracted.
+
+    Parameters
+    ----------
+    cost : float32 (4 m,)
+    face_state : uint8 (m,)
+        Faces that are not RANKED are passed over.
+    step : int
+    costs : float32 (k,), out
+        Room for three of each face.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
+    n = 0
+    for f in range(0, face_state.size, step):
+        is_ranked = face_state[f] == RANKED
+        x, y, z = costs_of(cost, f)
+        for price in (x, y, z):
+            costs[n] = price
+            n += is_ranked & (price < np.inf)
+    return n
+
+
+@kernel_in_place
 def count_cheaper(cost, listed, blocks, threshold, n_cheaper):
     """Tell about how many edges of each block cost less than a threshold."""
     for b in range(len(blocks)):
