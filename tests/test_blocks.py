@@ -13,7 +13,7 @@ import naive
 import strategies
 import tetsimplify
 from test_simplify import assert_maps_fit, assert_same_topology
-from tetsimplify import blocks, kernels
+from tetsimplify import blocks, crew, kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_lengths
@@ -30,7 +30,7 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(blocks, "FACES", 120)
     monkeypatch.setattr(blocks, "RUN", 120)
     monkeypatch.setattr(blocks, "LONGEST_RUN", 120)
-    monkeypatch.setattr(blocks, "PART", 100)
+    monkeypatch.setattr(crew, "LARGEST_PART", 100)
     monkeypatch.setattr(blocks, "MOST_SHARED", 1.0)
     monkeypatch.setattr(blocks, "CELL_BITS", 5)
     monkeypatch.setattr(blocks, "AT_ONCE", 4)

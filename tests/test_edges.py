@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tetsimplify import edges
+from tetsimplify import crew
 from tetsimplify.crew import Crew
 from tetsimplify.edges import edge_extremes, edge_lengths
 from tetsimplify.mesh import Mesh
@@ -30,7 +30,7 @@ def test_no_faces():
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_extremes_are_those_of_all_edges(threads, monkeypatch):
-    monkeypatch.setattr(edges, "AT_ONCE", 7)
+    monkeypatch.setattr(crew, "LARGEST_PART", 7)
     rng = np.random.default_rng(0)
     mesh = Mesh(rng.random((30, 3)), rng.integers(0, 30, (50, 3)).astype(np.int32))
     mesh.faces[:, 1] = (mesh.faces[:, 0] + 1) % 30  # no degenerate faces

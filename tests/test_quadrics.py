@@ -123,6 +123,19 @@ def error_at(quadrics, vertices, v, u, point):
     return float(y @ matrix(q) @ y + 2.0 * np.dot(q[6:9], y) + q[9])
 
 
+def test_a_sample_of_costs_is_that_of_ranked_edges_that_may_go():
+    vertices, faces = meshes.grid(60, 60)
+    locked = np.random.default_rng(0).random(len(vertices)) < 0.3
+    engine = Engine(as_mesh(vertices, faces), Options(keep_ratio=0.2), locked)
+    for share in (0.05, 0.3):
+        costs = engine.sample_of_costs()
+        rows = engine._cost.reshape(-1, COLUMNS)[:, :LEAST]
+        rows = rows[engine._surface.face_state == kernels.state.RANKED]
+        assert costs.tolist() == sorted(rows[rows < np.inf].tolist())
+        assert len(costs) < rows.size  # locked ends, and edges seen from the other face
+        engine.sweep_ranked(costs[[int(share * len(costs))]].astype(np.float64))
+
+
 @pytest.mark.parametrize("scale", [1e-70, 1.0, 1e70])
 def test_planes_of_faces_of_any_size(scale):
     vertices, faces = meshes.icosphere(2)

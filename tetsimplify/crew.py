@@ -15,12 +15,8 @@ N_PARTS = 8  # or more: so that threads end at about the same time
 
 
 def part_size(n_items: int) -> int:
-    """So many items in a part, where what is done with them does not depend on the parts.
-
-    A multiple of 2**10, and of so many items always the same.
-    """
-    size = min(max(LEAST_PART, -(-n_items // N_PARTS)), LARGEST_PART)
-    return -(-size // 2**10) * 2**10
+    """So many items in a part, where what is done with them does not depend on the parts."""
+    return min(max(LEAST_PART, -(-n_items // N_PARTS)), LARGEST_PART)
 
 
 class Crew:
