@@ -13,7 +13,7 @@ from test_simplify import assert_same_topology
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.crew import Crew
-from tetsimplify.fit import COS_TURN, EXACT, LIGHT, THOROUGH, Links, _Fit, fit_mesh
+from tetsimplify.fit import COS_TURN, DOUBT, EXACT, LIFT, LIGHT, THOROUGH, Links, _Fit, fit_mesh
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options
 from tetsimplify.topology import examine
@@ -23,6 +23,18 @@ def gyroid(n=40):
     x, y, z = np.mgrid[0 : 2 * np.pi : n * 1j, 0 : 2 * np.pi : n * 1j, 0 : 2 * np.pi : n * 1j]
     values = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
     return tetsimplify.extract_isosurface(values, 0.1)
+
+
+def bumps():
+    """A square with bumps that have tips."""
+    vertices, faces = meshes.grid(120, 120)
+    xy = np.array(vertices)[:, :2] / np.ptp(np.array(vertices)[:, 0])
+    rng = np.random.default_rng(3)
+    z = sum(
+        0.05 * h * np.exp(-np.linalg.norm(xy - at, axis=1) / 0.02)
+        for at, h in zip(rng.uniform(size=(60, 2)), rng.normal(size=60), strict=True)
+    )
+    return np.column_stack([xy, z]), faces
 
 
 CURVED = {"sphere": lambda: meshes.icosphere(5), "torus": torus, "gyroid": gyroid}
@@ -152,8 +164,9 @@ def test_sums_are_those_of_samples_one_by_one():
         assert np.allclose(got, rights[:, k] * scale, atol=1e-3 * np.abs(rights).max() * scale)
 
 
-def test_steps_solve_the_least_squares():
+def test_steps_solve_the_least_squares(monkeypatch):
     """After many sweeps, without the pull: the normal equations of all steps together."""
+    monkeypatch.setattr("tetsimplify.fit.LIFT", np.inf)
     mesh = meshes.icosphere(4)
     result = contracted(mesh, keep_ratio=0.1)
     stiffness = 0.05
@@ -189,6 +202,30 @@ def test_steps_solve_the_least_squares():
     assert np.allclose(fit._steps, expected, atol=1e-6 * np.abs(expected).max())
 
 
+def test_steps_out_of_the_surface_are_no_longer_than_heights(monkeypatch):
+    """They are cut short there, and not along the surface, if no vertex knows of others."""
+    monkeypatch.setattr("tetsimplify.fit.VERTICES", 1)
+    mesh, steps = bumps(), []
+    result = contracted(mesh, keep_ratio=0.15)
+    for lift in (LIFT, np.inf):
+        monkeypatch.setattr("tetsimplify.fit.LIFT", lift)
+        fit = started(mesh, result, LIGHT)
+        fit.solve(LIGHT)
+        steps.append(fit._steps)
+    cut, whole = steps
+    normals, limits = np.zeros_like(cut), np.zeros(len(cut))
+    for v in range(len(cut)):
+        star = np.flatnonzero((result.faces == v).any(axis=1))
+        normals[v] = fit._normals[star, :3].sum(axis=0)
+        squares, counts = fit._sums[star][:, [kernels.fit.R2, kernels.fit.COUNT]].sum(axis=0)
+        limits[v] = LIFT * np.sqrt(squares / (counts + DOUBT))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    out = (whole * normals).sum(axis=1)
+    assert 0.02 < (np.abs(out) > limits).mean() < 0.5
+    expected = whole + (np.clip(out, -limits, limits) - out)[:, None] * normals
+    assert np.allclose(cut, expected, atol=1e-6 * np.abs(whole).max())
+
+
 # --- what it is for -------------------------------------------------------------------------------
 
 
@@ -212,6 +249,21 @@ def test_curved_surfaces_come_nearer_and_keep_their_topology(name, ratio):
     )
     assert after.report.shortest_edge_after == pytest.approx(lengths.min())
     assert after.report.seconds["fit"] > 0.0 and "fit" not in before.report.seconds
+
+
+def test_tips_do_not_stick_out(monkeypatch):
+    mesh = bumps()
+    result = contracted(mesh, keep_ratio=0.15)
+    distances = []
+    for lift in (LIFT, np.inf):
+        monkeypatch.setattr("tetsimplify.fit.LIFT", lift)
+        after = fitted(mesh, result), result.faces
+        distances.append(tetsimplify.surface_distance(after, mesh))
+    less, more = distances
+    assert np.sort(less.a_to_b.vertex_distances)[-20:].mean() < 0.95 * (
+        np.sort(more.a_to_b.vertex_distances)[-20:].mean()
+    )
+    assert less.mean < more.mean
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e6])

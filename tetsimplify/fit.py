@@ -41,6 +41,8 @@ EXACT = 1e-9  # of the size of the mesh: a height that is as good as none
 FLAT = 1e-3  # of the edges around: the height of faces that are not to be pulled from what they fit
 LARGEST = 1e300  # size of a mesh, and one over it: beyond, nothing is moved
 REACH = 3.0  # in root mean squared heights: how far a vertex may go in a round
+LIFT = 0.8  # the same at right angles to the surface
+DOUBT = 6.0  # so many samples more, without height, are thought of for that
 
 
 class Plan(NamedTuple):
@@ -303,7 +305,9 @@ class _Fit:
 
     def solve(self, plan: Plan) -> None:
         """Find the steps of all vertices."""
-        solver: Solver = kernels.fit.Solver(plan.stiffness, plan.pull, EXACT**2, FLAT**2, REACH**2)
+        solver: Solver = kernels.fit.Solver(
+            *(plan.stiffness, plan.pull, EXACT**2, FLAT**2, REACH**2, LIFT**2, DOUBT)
+        )
 
         def solve(part: slice) -> None:
             kernels.fit.solve(

@@ -13,6 +13,11 @@ w is one over the square root of the root mean squared height of the face: betwe
 and least distances, so that faces that fit already hold what they have. g pulls a vertex towards
 the middle of its neighbours, in the surface, which keeps the triangles well shaped.
 
+The solution is the best for the samples, not for the surface between them: where these are few and
+high, above all at tips, a vertex would go out farther than the surface is. So a step is cut short
+at right angles to the surface, where it is longer than most of the heights around. That makes the
+largest distance less, and the mean too.
+
 All lengths are those of a frame in which the surface has a size of about one.
 """
 
@@ -42,6 +47,8 @@ class Solver(NamedTuple):
     exact2: float  # squared height of what is as good as exact
     flat2: float  # of squared edges: squared height of faces that hold what they have
     reach2: float  # squared, in rms heights: how far a vertex may go
+    lift2: float  # the same at right angles to the surface
+    doubt: float  # so many more samples without height are thought of there
 
 
 @kernel_in_place
@@ -248,7 +255,13 @@ def solve(places, corner_vertex, links, sums, held, solver, first, last, before,
         certainty = max(8.0 * oo / (around * around) - 1.0, 0.0)
         length2, most2 = x * x + y * y + z * z, certainty * solver.reach2 * r2 / count
         s = np.sqrt(most2 / length2) if length2 > most2 else 1.0
-        steps[v, 0], steps[v, 1], steps[v, 2] = s * x, s * y, s * z
+        x, y, z = s * x, s * y, s * z
+        # Where a few samples want it far out it would stick out of the surface there.
+        out, most2 = x * ox + y * oy + z * oz, solver.lift2 * r2 / (count + solver.doubt)
+        if out * out > most2 * oo:
+            s = (np.sqrt(most2 * oo) / abs(out) - 1.0) * out / oo
+            x, y, z = x + s * ox, y + s * oy, z + s * oz
+        steps[v, 0], steps[v, 1], steps[v, 2] = x, y, z
 
 
 @kernel_in_place
