@@ -13,7 +13,19 @@ from test_simplify import assert_same_topology
 from tetsimplify import kernels
 from tetsimplify.arrays import as_mesh
 from tetsimplify.crew import Crew
-from tetsimplify.fit import COS_TURN, DOUBT, EXACT, LIFT, LIGHT, THOROUGH, Links, _Fit, fit_mesh
+from tetsimplify.fit import (
+    COS_TURN,
+    DOUBT,
+    EXACT,
+    HIGH,
+    HIGHEST,
+    LIFT,
+    LIGHT,
+    THOROUGH,
+    Links,
+    _Fit,
+    fit_mesh,
+)
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Options
 from tetsimplify.topology import examine
@@ -35,6 +47,19 @@ def bumps():
         for at, h in zip(rng.uniform(size=(60, 2)), rng.normal(size=60), strict=True)
     )
     return np.column_stack([xy, z]), faces
+
+
+def dented():
+    """A smooth graph, contracted, and the graph with dents that contraction knew nothing of."""
+    vertices, faces = meshes.grid(60, 60)
+    x, y = np.array(vertices)[:, :2].T / 60
+    smooth = np.column_stack([x, y, 0.1 * np.sin(3 * x) * np.cos(2 * y)])
+    with_dents, side = smooth.copy(), 1
+    for i in range(10, 60, 13):
+        for j in range(10, 60, 13):
+            with_dents[61 * i + j, 2] += 0.002 * side
+            side = -side
+    return (with_dents, faces), contracted((smooth, faces), keep_ratio=0.25)
 
 
 CURVED = {"sphere": lambda: meshes.icosphere(5), "torus": torus, "gyroid": gyroid}
@@ -155,6 +180,12 @@ def test_sums_are_those_of_samples_one_by_one():
     assert counts.sum() > 0.95 * 3 * len(result.faces)
     assert np.allclose(found[:, columns.R2], squares * scale**2, rtol=1e-4, atol=1e-12)
     assert np.allclose(found[:, columns.WEIGHT], weights * counts, rtol=1e-4)
+    highest = np.zeros(len(result.faces))
+    for face, _, height in naive_samples(mesh, result, LIGHT):
+        highest[face] = max(highest[face], abs(height) * scale)
+    assert np.allclose(found[:, columns.MOST2], highest**2, rtol=1e-4, atol=1e-12)
+    assert np.allclose(fit._of_groups.sum(axis=0)[:2], found[:, [columns.R2, columns.COUNT]].sum(0))
+    assert fit._of_groups[:, 2].max() == found[:, columns.MOST2].max()
     for k in range(3):
         got = found[:, columns.SQUARE + k] / weights
         assert np.allclose(got, products[:, k, k], atol=1e-3)
@@ -226,6 +257,49 @@ def test_steps_out_of_the_surface_are_no_longer_than_heights(monkeypatch):
     assert np.allclose(cut, expected, atol=1e-6 * np.abs(whole).max())
 
 
+def naive_ease(fit, faces):
+    """The steps after the highest samples were eased, and how many; nothing is held."""
+    columns, sums, steps = kernels.fit, fit._sums.astype(float), fit._steps.copy()
+    highest = np.sqrt(sums[:, columns.MOST2])
+    rights = sums[:, columns.RIGHT : columns.RIGHT + 3]
+    sides = np.where(rights.sum(axis=1) < 0.0, -1.0, 1.0)
+    rms = np.sqrt(sums[:, columns.R2].sum() / sums[:, columns.COUNT].sum())
+    limit, normals = max(HIGH * rms, HIGHEST * highest.max()), fit._normals[:, :3]
+    busy, n_eased = set(), 0
+    for f in np.argsort(-highest, kind="stable"):
+        shares = np.maximum(sides[f] * rights[f], 0.0)
+        shares /= shares.sum() or 1.0
+        height = highest[f] - sides[f] * shares @ steps[faces[f]] @ normals[f]
+        stars = [np.flatnonzero((faces == v).any(axis=1)) for v in faces[f]]
+        around = np.unique(np.concatenate(stars))
+        certain = all(2 * (normals[star].mean(axis=0) ** 2).sum() - 1 > 0.3 for star in stars)
+        against = highest[around][sides[around] != sides[f]].max(initial=0.0)
+        ease = 0.5 * (height - against)
+        if (
+            busy & {*faces[f]}
+            or highest[f] <= limit
+            or not (certain and height > limit and ease > 0.1 * height)
+        ):
+            continue
+        steps[faces[f]] += np.outer(shares, sides[f] * ease / (shares @ shares) * normals[f])
+        busy |= {*faces[around].ravel()}
+        n_eased += 1
+    return steps, n_eased
+
+
+def test_the_highest_samples_are_eased_one_by_one(monkeypatch):
+    monkeypatch.setattr("tetsimplify.fit.GROUP_BITS", 6)
+    mesh, result = dented()
+    fit = started(mesh, result, LIGHT)
+    fit.solve(LIGHT)
+    before = fit._steps.copy()
+    expected, n_eased = naive_ease(fit, result.faces)
+    fit.ease_highest()
+    assert n_eased > 2
+    assert 6 < (before != fit._steps).any(axis=1).sum() <= 3 * n_eased
+    assert np.allclose(fit._steps, expected, atol=1e-5 * np.abs(expected).max())
+
+
 # --- what it is for -------------------------------------------------------------------------------
 
 
@@ -264,6 +338,18 @@ def test_tips_do_not_stick_out(monkeypatch):
         np.sort(more.a_to_b.vertex_distances)[-20:].mean()
     )
     assert less.mean < more.mean
+
+
+def test_the_largest_distance_becomes_less_where_single_samples_are_high(monkeypatch):
+    (mesh, result), largest = dented(), []
+    for eases in (True, False):
+        monkeypatch.setattr("tetsimplify.fit.LIGHT", LIGHT._replace(eases=eases))
+        after = fitted(mesh, result), result.faces
+        distance = tetsimplify.surface_distance(after, mesh, tolerance=1e-5)
+        largest.append((distance.lower, distance.mean))
+    (less, mean), (more, mean_before) = largest
+    assert less < 0.9 * more
+    assert mean_before < mean < 0.05 * less  # what that costs
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e6])

@@ -43,6 +43,8 @@ LARGEST = 1e300  # size of a mesh, and one over it: beyond, nothing is moved
 REACH = 3.0  # in root mean squared heights: how far a vertex may go in a round
 LIFT = 0.8  # the same at right angles to the surface
 DOUBT = 6.0  # so many samples more, without height, are thought of for that
+HIGH = 5.0  # in root mean squared heights of all: what is high
+HIGHEST = 0.6  # of the largest height of all: what is lowered
 
 
 class Plan(NamedTuple):
@@ -61,13 +63,31 @@ class Plan(NamedTuple):
     stiffness: float
     pull: float
     """See `kernels.fit.Solver`."""
+    eases: bool
+    """Whether the highest samples are lowered by more than the equations say."""
 
 
 LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly anything is gained
 FEW = 16.0  # where there are as many, there is time for more, and more to gain
-LIGHT = Plan(per_face=3.5, least_stride=1, rounds=1, flips=0, sweeps=1, stiffness=0.01, pull=0.2)
+LIGHT = Plan(
+    per_face=3.5,
+    least_stride=1,
+    rounds=1,
+    flips=0,
+    sweeps=1,
+    stiffness=0.01,
+    pull=0.2,
+    eases=True,
+)
 THOROUGH = Plan(
-    per_face=8.0, least_stride=4, rounds=3, flips=1, sweeps=2, stiffness=0.0015, pull=0.3
+    per_face=8.0,
+    least_stride=4,
+    rounds=3,
+    flips=1,
+    sweeps=2,
+    stiffness=0.0015,
+    pull=0.3,
+    eases=False,
 )
 
 
@@ -145,6 +165,8 @@ def fit_mesh(
             fit.hold_features(cos_feature)
         fit.take_samples(given, vertex_map, plan, i)
         fit.solve(plan)
+        if plan.eases:
+            fit.ease_highest()
         fit.move(cosine)
         if flips and i < plan.flips:
             fit.turn_over(cosine)
@@ -201,6 +223,7 @@ class _Fit:
         self._sums = memory.cache_lines(m).view(np.float32)
         self._samples: Samples | None = None
         self._ends: NDArray[np.int64] | None = None
+        self._of_groups: Array = np.zeros((0, 3))
         self._desks: SimpleQueue[Desk] = SimpleQueue()
 
         def enter(part: slice) -> None:
@@ -286,15 +309,16 @@ class _Fit:
             )
             self._desks.put(desk)
 
-        def add_up(part: slice) -> None:
+        def add_up(part: slice) -> tuple[float, float, float]:
             group = part.start >> GROUP_BITS
-            kernels.fit.sum_samples(
+            of_group: tuple[float, float, float] = kernels.fit.sum_samples(
                 samples, ends, self._normals, group, part.start, part.stop, EXACT**2, self._sums
             )
+            return of_group
 
         self._ends = ends
         self._crew.share(take, n_samples, SAMPLES)
-        self._crew.share(add_up, m, 2**GROUP_BITS)
+        self._of_groups = np.array(self._crew.share(add_up, m, 2**GROUP_BITS))
 
     def _take_desk(self) -> Desk:
         """A desk that is free, or a new one."""
@@ -320,6 +344,24 @@ class _Fit:
             if i:
                 self._steps, self._steps_before = self._steps_before, self._steps
             self._crew.share(solve, len(self._places), VERTICES)
+
+    def ease_highest(self) -> None:
+        """Change steps where single samples are far higher than all others."""
+        squares, counts, most2 = self._of_groups.T
+        mean2 = squares.sum() / max(counts.sum(), 1.0)
+        limit2 = max(HIGH**2 * mean2, HIGHEST**2 * float(most2.max()), EXACT**2)
+        of_faces = self._sums[:, kernels.fit.MOST2]
+        faces = [
+            first + np.flatnonzero(of_faces[first : first + 2**GROUP_BITS] > limit2)
+            for first in np.flatnonzero(most2 > limit2) << GROUP_BITS
+        ]
+        if faces:
+            found = np.concatenate(faces)
+            order = found[np.argsort(-of_faces[found], kind="stable")]
+            kernels.fit.ease_highest(
+                *(order, self.faces.reshape(-1), self._links, self._sums, self._held),
+                *(math.sqrt(limit2), EXACT**2, np.zeros(len(self._places), np.uint8), self._steps),
+            )
 
     def move(self, cos_turn: float) -> None:
         """Take back steps that harm faces, until none does, and do the others."""

@@ -31,11 +31,15 @@ from tetsimplify.kernels.jit import kernel_in_place, part
 
 TINY = 1e-300  # in place of zero as a divisor
 MOST_FLAT = 1e6  # times as stiff a spring may become
+EASED = 0.5  # of what the highest sample is higher than others on the other side
+LEAST_EASED = 0.1  # of its height: less is not worth it
+LEAST_CERTAINTY = 0.3  # of vertices that are moved for a single sample
+LEAST_LEVER = 0.1  # how much a sample moves with its face, at least
 
 # Columns of the sums of a face: of l l for each corner, of l l' for each and the one ahead, of l r;
 # how many samples, of r^2, and the weight of all. The first nine are weighted. The normal is there
-# too, so that one line of a cache has all that is solved with.
-SQUARE, PRODUCT, RIGHT, COUNT, R2, WEIGHT, NORMAL = 0, 3, 6, 9, 10, 11, 12
+# too, so that one line of a cache has all that is solved with, and the largest r^2.
+SQUARE, PRODUCT, RIGHT, COUNT, R2, WEIGHT, NORMAL, MOST2 = 0, 3, 6, 9, 10, 11, 12, 15
 N_COLUMNS = 16  # a line of a cache
 
 
@@ -110,6 +114,8 @@ def hold_features(links, normals, cosine, first, last, held):
 def sum_samples(samples, ends, normals, group, first, last, exact2, sums):
     """Add up the samples of a group of faces, from `first` to `last`, and weight the sums.
 
+    Returns the sum of r^2, how many samples there are, and the largest r^2.
+
     Parameters
     ----------
     samples : Samples
@@ -122,6 +128,7 @@ def sum_samples(samples, ends, normals, group, first, last, exact2, sums):
         Squared height of what is as good as exact.
     sums : float32 (m, N_COLUMNS), out
     """
+    r2 = count = most2 = 0.0
     sums[first:last] = 0.0
     for k in range(len(ends)):
         for i in range(ends[k, group], ends[k, group + 1]):
@@ -136,6 +143,10 @@ def sum_samples(samples, ends, normals, group, first, last, exact2, sums):
             for column in range(COUNT):
                 of_face[column] *= weight
             of_face[WEIGHT] = weight * of_face[COUNT]
+            r2 += of_face[R2]
+            count += of_face[COUNT]
+            most2 = max(most2, np.float64(of_face[MOST2]))
+    return r2, count, most2
 
 
 @part
@@ -154,6 +165,7 @@ def _add_sample(foot, of_face):
     of_face[RIGHT + 2] += c * r
     of_face[COUNT] += np.float32(1.0)
     of_face[R2] += r * r
+    of_face[MOST2] = max(of_face[MOST2], r * r)
 
 
 @kernel_in_place
@@ -262,6 +274,113 @@ def solve(places, corner_vertex, links, sums, held, solver, first, last, before,
             s = (np.sqrt(most2 * oo) / abs(out) - 1.0) * out / oo
             x, y, z = x + s * ox, y + s * oy, z + s * oz
         steps[v, 0], steps[v, 1], steps[v, 2] = x, y, z
+
+
+@kernel_in_place
+def ease_highest(order, corner_vertex, links, sums, held, limit, exact2, busy, steps):
+    """Lower the highest samples by more than the solution does; return for how many faces.
+
+    The steps of the corners of such a face change so that the sample comes nearer by half of what
+    it is higher than others around that come to be higher by that. Where it is on the face is not
+    known any more: the mean over the heights of all samples tells it. Corners where the surface
+    turns are left alone, and those of faces that fit exactly.
+
+    Parameters
+    ----------
+    order : int64 (k,)
+        The faces, the highest first. Around each that was eased no other one is.
+    corner_vertex : int32 (3 m,)
+    links : tuple
+        As of `hold_features`.
+    sums : float32 (m, N_COLUMNS)
+    held : uint8 (n,)
+        Which vertices stay.
+    limit : float
+        Height that is not too high.
+    exact2 : float
+        Squared height of what is as good as exact.
+    busy : uint8 (n,)
+        Zeros; the vertices around faces that were eased are marked.
+    steps : float64 (n, 3)
+    """
+    n_eased = 0
+    for f in order:
+        of_face = sums[f]
+        nx, ny, nz = of_face[NORMAL], of_face[NORMAL + 1], of_face[NORMAL + 2]
+        sign, total, lever = _side(of_face), 0.0, 0.0
+        for k in range(3):
+            total += max(sign * of_face[RIGHT + k], 0.0)
+        if not total > 0.0:
+            continue
+        r = np.sqrt(np.float64(of_face[MOST2]))
+        against, is_free = 0.0, True
+        for k in range(3):
+            corner = 3 * np.int64(f) + k
+            v = corner_vertex[corner]
+            share = max(sign * of_face[RIGHT + k], 0.0) / total
+            r -= sign * share * (nx * steps[v, 0] + ny * steps[v, 1] + nz * steps[v, 2])
+            lever += 0.0 if held[v] else share * share
+            is_free &= not busy[v]
+            if is_free:
+                most, is_certain = _most_against(links, sums, v, sign, exact2)
+                against = max(against, most)
+                is_free &= is_certain
+        ease = EASED * (r - against)
+        if not (is_free and r > limit and lever > LEAST_LEVER and ease > LEAST_EASED * r):
+            continue
+        for k in range(3):
+            v = corner_vertex[3 * np.int64(f) + k]
+            if not held[v]:
+                by = sign * ease / lever * max(sign * of_face[RIGHT + k], 0.0) / total
+                steps[v, 0] += by * nx
+                steps[v, 1] += by * ny
+                steps[v, 2] += by * nz
+            _mark_around(corner_vertex, links, v, busy)
+        n_eased += 1
+    return n_eased
+
+
+@part
+def _side(of_face):
+    """1 where the samples of a face are above it on the whole, else -1."""
+    return np.copysign(1.0, of_face[RIGHT] + of_face[RIGHT + 1] + of_face[RIGHT + 2])
+
+
+@part
+def _most_against(links, sums, v, sign, exact2):
+    """The largest height on the other side around a vertex, and whether it may be moved."""
+    first_corner, next_corner = links
+    most = ox = oy = oz = around = 0.0
+    is_inexact = True
+    corner = first_corner[v]
+    while True:
+        of_face = sums[face_of(corner)]
+        if _side(of_face) != sign:
+            most = max(most, np.sqrt(np.float64(of_face[MOST2])))
+        is_inexact &= of_face[COUNT] == 0.0 or of_face[R2] > exact2 * of_face[COUNT]
+        ox += of_face[NORMAL]
+        oy += of_face[NORMAL + 1]
+        oz += of_face[NORMAL + 2]
+        around += 1.0
+        corner = next_corner[corner]
+        if corner == first_corner[v]:
+            break
+    certainty = 2.0 * (ox * ox + oy * oy + oz * oz) / (around * around) - 1.0
+    return most, is_inexact and certainty > LEAST_CERTAINTY
+
+
+@part
+def _mark_around(corner_vertex, links, v, marked):
+    """Mark the vertices of all faces around a vertex."""
+    first_corner, next_corner = links
+    marked[v] = 1
+    corner = first_corner[v]
+    while True:
+        p, q = others(corner_vertex, corner)
+        marked[p] = marked[q] = 1
+        corner = next_corner[corner]
+        if corner == first_corner[v]:
+            break
 
 
 @kernel_in_place
