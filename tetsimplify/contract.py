@@ -54,10 +54,10 @@ def contract(
     Without the mesh, which need not be kept, nothing is told of its shortest edge.
     """
     options = engine.options
-    shortest_before = np.inf if engine.shortest_edge is None else engine.shortest_edge
-    if mesh is not None and engine.shortest_edge is None:
+    shortest_before = np.inf
+    if mesh is not None:
         with clock.stage("check"):
-            shortest_before, _ = edge_extremes(mesh, Crew(engine.n_threads))
+            shortest_before = engine.shortest_edge(mesh)
 
     with clock.stage("contract"):
         n_rounds = 1

@@ -98,8 +98,6 @@ class Engine:
     n_threads : int
     min_faces : int
         So many faces are to be left.
-    shortest_edge : float or None
-        Its length in the mesh given, where it is known.
     is_part : bool
         Whether this is a part of a surface, of which nothing need be told.
 
@@ -125,10 +123,10 @@ class Engine:
         )
         start = start_surface(mesh, self._arranged, options, locked, vertex_block, self.n_threads)
         self._surface, self.topology_before, _, self._on_loops = start
-        self._quadrics, self.shortest_edge = None, None
+        self._quadrics = self._shortest_edge = None
         if options.uses_quadrics:
             arranged_bound = None if bound is None else bound[self._arranged.vertex_origin]
-            self._quadrics, self._area, self.shortest_edge = start_quadrics(
+            self._quadrics, self._area, self._shortest_edge = start_quadrics(
                 start, options, arranged_bound, self._crew
             )
         self._cost = None
@@ -179,6 +177,12 @@ class Engine:
     def _n_spare(self) -> int:
         """How many faces may still go."""
         return self.n_faces - self.min_faces if self.min_faces else blocks.UNLIMITED
+
+    def shortest_edge(self, mesh: Mesh) -> float:
+        """The length of the shortest edge of the mesh given."""
+        if self._shortest_edge is None:
+            self._shortest_edge, _ = edge_extremes(mesh, self._crew)
+        return self._shortest_edge
 
     @property
     def on_boundary(self) -> NDArray[np.bool_]:
