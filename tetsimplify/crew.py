@@ -10,7 +10,7 @@ from tetsimplify.workers import Workers
 
 Result = TypeVar("Result")
 
-LEAST_PART, LARGEST_PART = 2**13, 2**17  # items
+LEAST_PART, LARGEST_PART = 2**15, 2**17  # items
 N_PARTS = 8  # or more: so that threads end at about the same time
 
 
