@@ -7,7 +7,7 @@ the new vertex get the state `colour`.
 import numpy as np
 
 from tetsimplify.kernels.corners import DEAD, ahead
-from tetsimplify.kernels.cost import COLUMNS, LEAST
+from tetsimplify.kernels.cost import LEAST, place_of
 from tetsimplify.kernels.jit import inlined, part
 from tetsimplify.kernels.lens import keep_one_lens
 from tetsimplify.kernels.link import gather_stars, link_condition, list_ring
@@ -177,7 +177,7 @@ def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
         f = lists[DOOMED, i]
         surface.face_state[f] = SETTLED
         if cost is not None:
-            cost[COLUMNS * f + LEAST] = np.inf
+            cost[place_of(f, LEAST)] = np.inf
         for corner in range(3 * f, 3 * f + 3):
             corner_vertex[np.uint32(corner)] = DEAD
     scratch.tally[N_LIVE] -= n_doomed
@@ -206,7 +206,7 @@ def _merge(surface, quadrics, scratch, cost, v, u, n_v, n_u, n_doomed, colour):
         f = corner // np.uint32(3)
         surface.face_state[f] = _touched(surface.face_state, corner, f, colour)
         if cost is not None:
-            cost[np.uint32(COLUMNS) * f + np.uint32(LEAST)] = -np.inf
+            cost[place_of(f, LEAST)] = -np.inf
 
 
 @part

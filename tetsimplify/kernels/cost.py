@@ -93,22 +93,27 @@ def _ranked_cost(surface, quadrics, rules, a, b):
 
 
 @part
+def place_of(f, k):
+    """Where the cost of the edge from the k-th corner of a face is, or the LEAST one."""
+    return np.uint32(COLUMNS) * np.uint32(f) + np.uint32(k)
+
+
+@part
 def least_cost(cost, f):
     """The least of the costs of a face; less than all costs where they are not up to date."""
-    return cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)]
+    return cost[place_of(f, LEAST)]
 
 
 @part
 def costs_of(cost, f):
     """The costs of the three edges of a face."""
-    first = np.uint32(f) * np.uint32(COLUMNS)
-    return cost[first], cost[first + np.uint32(1)], cost[first + np.uint32(2)]
+    return cost[place_of(f, 0)], cost[place_of(f, 1)], cost[place_of(f, 2)]
 
 
 @part
 def note_least(cost, f):
     """Bring the least of the costs of a face up to date."""
-    cost[np.uint32(f) * np.uint32(COLUMNS) + np.uint32(LEAST)] = cheapest(costs_of(cost, f))[0]
+    cost[place_of(f, LEAST)] = cheapest(costs_of(cost, f))[0]
 
 
 @part
@@ -168,7 +173,7 @@ def rank_faces(surface, quadrics, rules, cost, scratch, n_faces, colour, max_cos
         f = np.uint32(waiting[i])
         is_ranked = surface.face_state[f] == RANKED
         least = cheapest(costs_of(cost, f))[0]
-        place = f * np.uint32(COLUMNS) + np.uint32(LEAST)
+        place = place_of(f, LEAST)
         cost[place] = least if is_ranked else cost[place]
         waiting[n_waiting] = f
         n_waiting += is_ranked & (least < max_cost)
@@ -186,7 +191,7 @@ def is_special(surface, a, b, c):
 @part
 def _pend(surface, cost, lists, n, f, k, a, b):
     """Let the edge ab from the k-th corner of a face wait, if it is ranked from there."""
-    place = np.uint32(COLUMNS) * f + k
+    place = place_of(f, k)
     cost[place] = np.inf
     surface.verdict[np.uint32(3) * f + k] = CONTRACTIBLE
     lists[PENDING, n], lists[PENDING + 1, n], lists[PENDING + 2, n] = place, a, b
@@ -199,7 +204,7 @@ def _rank_alone(surface, quadrics, rules, cost, f, k, a, b):
     price, verdict = np.inf, CONTRACTIBLE
     if is_ranked(surface.loop, a, b):
         price, verdict = _ranked_cost(surface, quadrics, rules, a, b)
-    cost[np.uint32(COLUMNS) * f + k] = price
+    cost[place_of(f, k)] = price
     surface.verdict[np.uint32(3) * f + k] = verdict
 
 

@@ -11,12 +11,12 @@ import numpy as np
 from tetsimplify.kernels.contraction import contract_nested, contract_simple
 from tetsimplify.kernels.corners import DEAD
 from tetsimplify.kernels.cost import (
-    COLUMNS,
     cheapest,
     costs_of,
     edge_costs,
     least_cost,
     note_least,
+    place_of,
     rank_faces,
     without,
 )
@@ -297,7 +297,7 @@ def _put_off(surface, scratch, rules, cost, f, k, outcome):
     if outcome == OUTSIDE:
         return
     surface.verdict[3 * f + k] = outcome
-    place = COLUMNS * f + k
+    place = place_of(f, k)
     if outcome == TOO_DEAR:
         cost[place] = scratch.point[COST]
     elif outcome == OBSTRUCTED or outcome == ERROR_BOUND:
