@@ -202,6 +202,8 @@ def _simplify_in_place(ms: pymeshlab.MeshSet, options: dict[str, Any]) -> dict[s
         given.vertices,
         given.faces,
         vertex_data={k: rows for k, rows in given.vertex_data.items() if _is_to_carry(k, rows)},
+        # Faces stay those of PyMeshLab: with data of faces no edge is turned over.
+        face_data={"face": np.arange(len(given.faces))},
         wedge_data=wedges,
         locked=locked,
         **options,

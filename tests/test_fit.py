@@ -21,6 +21,8 @@ from tetsimplify.fit import (
     HIGHEST,
     LIFT,
     LIGHT,
+    MEDIUM,
+    ROUGH,
     THOROUGH,
     Links,
     _Fit,
@@ -88,15 +90,15 @@ def cross_products(vertices, faces):
     return np.cross(b - a, c - a)
 
 
-def assert_faces_kept(before, after, faces, cosine=COS_TURN):
-    """None turned too far and none lost more than half of its area, but those that did not move."""
+def assert_faces_kept(before, after, faces, cosine=COS_TURN, least_area=0.5):
+    """None turned too far or lost more than half of its area, but those that did not move."""
     assert np.isfinite(after).all()
     old, new = cross_products(before, faces), cross_products(after, faces)
     moved = (before != after).any(axis=1)[faces].any(axis=1)
     sizes, new_sizes = np.linalg.norm(old, axis=1), np.linalg.norm(new, axis=1)
     cosines = (old * new).sum(axis=1)[moved] / (sizes * new_sizes)[moved]
     assert (cosines >= cosine - 1e-6).all()
-    assert (new_sizes[moved] >= 0.5 * sizes[moved] * (1 - 1e-6)).all()
+    assert (new_sizes[moved] >= least_area * sizes[moved] * (1 - 1e-6)).all()
 
 
 # --- against a slow oracle ------------------------------------------------------------------------
@@ -312,9 +314,10 @@ def test_curved_surfaces_come_nearer_and_keep_their_topology(name, ratio):
         tetsimplify.simplify(*mesh, keep_ratio=ratio),
     )
     stay = (before.faces == after.faces).all(axis=1)
-    assert stay.mean() > 0.8 and (stay.all() or ratio < 1 / 16)
+    assert stay.mean() > 0.8
     assert_same_topology(mesh[1], after)
-    assert_faces_kept(before.vertices, after.vertices, after.faces[stay])
+    least_area = 0.5 if ratio > 1 / 16 else 0.25
+    assert_faces_kept(before.vertices, after.vertices, after.faces[stay], least_area=least_area)
     assert mean_distance(mesh, *after[:2]) < 0.97 * mean_distance(mesh, *before[:2])
     shapes = [tetsimplify.quality(*result[:2]).radius_ratio.mean() for result in (before, after)]
     assert shapes[1] > shapes[0]
@@ -323,6 +326,17 @@ def test_curved_surfaces_come_nearer_and_keep_their_topology(name, ratio):
     )
     assert after.report.shortest_edge_after == pytest.approx(lengths.min())
     assert after.report.seconds["fit"] > 0.0 and "fit" not in before.report.seconds
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_edges_are_turned_over_where_it_is_rough(noise):
+    vertices, faces = meshes.icosphere(7)
+    bumps = 1.0 + noise * np.random.default_rng(4).normal(size=len(vertices))
+    mesh = vertices * bumps[:, None], faces
+    before, after = contracted(mesh, keep_ratio=0.15), tetsimplify.simplify(*mesh, keep_ratio=0.15)
+    fit = started(mesh, before, LIGHT)
+    assert (fit.roughness > ROUGH) == (noise > 0.0)
+    assert (before.faces != after.faces).any() == (noise > 0.0)
 
 
 def test_tips_do_not_stick_out(monkeypatch):
@@ -373,7 +387,7 @@ def test_the_units_and_the_place_do_not_matter():
             result._replace(vertices=result.vertices * scale + offset),
         )
         off = np.abs((moved - offset) / scale - vertices)
-        assert np.quantile(off, 0.95) < 1e-4 * size
+        assert np.quantile(off, 0.95) < 1e-3 * size
         if scale == 2.0 ** round(np.log2(scale)) and not offset:
             assert np.array_equal(moved, vertices * scale)
 
@@ -551,4 +565,6 @@ def test_progress_can_cancel():
 
 
 def test_more_is_done_where_more_is_left_out():
-    assert THOROUGH.per_face > LIGHT.per_face and THOROUGH.rounds > LIGHT.rounds
+    assert THOROUGH.rounds > MEDIUM.rounds > LIGHT.rounds
+    assert THOROUGH.per_face * THOROUGH.rounds > MEDIUM.per_face > LIGHT.per_face
+    assert THOROUGH.lowers and not MEDIUM.lowers

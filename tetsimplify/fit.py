@@ -4,7 +4,8 @@ Contraction puts each vertex where the planes merged into it want it. What count
 far the faces are from the surface given. So samples of that are taken, each is given to the nearest
 face of the result, and all vertices move a little so that the squared heights of the samples above
 their faces become least: see kernels/samples.py and kernels/fit.py. Where there is time, edges are
-turned over in between by the same samples, see flips.py. The topology stays.
+turned over in between by the same samples, see flips.py, and in the end the spots where it is
+farthest from the surface given are lowered, see spots.py. The topology stays.
 
 The work is done in parts that depend on the meshes alone, and so does the result.
 """
@@ -23,10 +24,12 @@ from tetsimplify.crew import Crew
 from tetsimplify.flips import Flips, Table, Taken, find_thin
 from tetsimplify.mesh import Mesh
 from tetsimplify.options import Progress
+from tetsimplify.spots import Spots, new_boxes
 
 if TYPE_CHECKING:
     from tetsimplify.kernels.fit import Solver
     from tetsimplify.kernels.samples import Desk, Samples, Stars
+    from tetsimplify.kernels.spots import Made
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -65,10 +68,13 @@ class Plan(NamedTuple):
     """See `kernels.fit.Solver`."""
     eases: bool
     """Whether the highest samples are lowered by more than the equations say."""
+    lowers: bool
+    """Whether the worst spots are lowered in the end, which are looked for on both surfaces."""
 
 
 LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly anything is gained
 FEW = 16.0  # where there are as many, there is time for more, and more to gain
+ROUGH = 0.005  # rms height of samples, in edges, from which on there is more to gain
 LIGHT = Plan(
     per_face=3.5,
     least_stride=1,
@@ -78,7 +84,9 @@ LIGHT = Plan(
     stiffness=0.01,
     pull=0.2,
     eases=True,
+    lowers=False,
 )
+MEDIUM = LIGHT._replace(per_face=8.0, rounds=2, flips=1, stiffness=0.0015)
 THOROUGH = Plan(
     per_face=8.0,
     least_stride=4,
@@ -88,6 +96,7 @@ THOROUGH = Plan(
     stiffness=0.0015,
     pull=0.3,
     eases=False,
+    lowers=True,
 )
 
 
@@ -156,23 +165,35 @@ def fit_mesh(
     if len(made.faces) in (0, len(given.faces)) or not 1.0 / LARGEST < size < LARGEST:
         return made
     plan = THOROUGH if len(given.faces) >= FEW * len(made.faces) else LIGHT
-    n_tasks = 3 + flips + (cos_feature is not None) + plan.rounds * (7 + plan.sweeps)
+    most = MEDIUM if plan is LIGHT else plan
+    n_tasks = 3 + flips + (cos_feature is not None) + most.rounds * (7 + most.sweeps)
+    n_tasks += 2 * most.lowers
     fit = _Fit(made, held, links, (low, high), Crew(threads, progress, "fit", n_tasks))
     cosine = max(cos_turn, COS_TURN)
+    fit.measure()
+    if cos_feature is not None:
+        fit.hold_features(cos_feature)
+    fit.take_samples(given, vertex_map, plan, 0)
+    if plan is LIGHT and fit.roughness > ROUGH:
+        plan = MEDIUM
     for i in range(plan.rounds):
-        fit.measure()
-        if cos_feature is not None and i == 0:
-            fit.hold_features(cos_feature)
-        fit.take_samples(given, vertex_map, plan, i)
+        if i:
+            fit.measure()
+            fit.take_samples(given, vertex_map, plan, i)
         fit.solve(plan)
         if plan.eases:
             fit.ease_highest()
         fit.move(cosine)
         if flips and i < plan.flips:
             fit.turn_over(cosine)
+    if plan.lowers:
+        fit.lower_spots(given, vertex_map, cosine)
     if flips:
         fit.turn_over_caps(cosine)
-    return Mesh(fit.vertices(), fit.faces)
+    fitted = Mesh(fit.vertices(), fit.faces)
+    if progress is not None:
+        progress("fit", 1.0)  # where less was done than might have been
+    return fitted
 
 
 def _box(mesh: Mesh) -> tuple[Array, Array]:
@@ -226,13 +247,16 @@ class _Fit:
         self._of_groups: Array = np.zeros((0, 3))
         self._desks: SimpleQueue[Desk] = SimpleQueue()
 
-        def enter(part: slice) -> None:
-            kernels.fit.enter_frame(
-                made.vertices, *self._frame, part.start, part.stop, self._places
-            )
-
-        crew.share(enter, n, AT_ONCE)
+        self._enter_frame(made.vertices, self._places)
         self._stars = self._new_stars(crew)
+
+    def _enter_frame(self, vertices: Array, places: Array) -> None:
+        """Put vertices into the frame."""
+
+        def enter(part: slice) -> None:
+            kernels.fit.enter_frame(vertices, *self._frame, part.start, part.stop, places)
+
+        self._crew.share(enter, len(vertices), AT_ONCE)
 
     def _new_stars(self, crew: Crew) -> Stars:
         """Room for the faces around each vertex."""
@@ -327,6 +351,13 @@ class _Fit:
         except Empty:
             return _new_desk()
 
+    @property
+    def roughness(self) -> float:
+        """The root mean squared height of the samples, over that of the edges, about."""
+        squares, counts, _ = self._of_groups.sum(axis=0)
+        area = float(self._normals[:, 3].mean())
+        return math.sqrt(squares / counts / area) if counts * area > 0.0 else 0.0
+
     def solve(self, plan: Plan) -> None:
         """Find the steps of all vertices."""
         solver: Solver = kernels.fit.Solver(
@@ -387,6 +418,20 @@ class _Fit:
                 break
             crew = Crew(crew.n_threads)  # how often is not known before
         self._crew.share(move, n, AT_ONCE)
+
+    def lower_spots(self, given: Mesh, vertex_map: Indices, cos_turn: float) -> None:
+        """Move vertices where the surfaces are farthest from each other."""
+        assert self._first_normals is not None
+        vertices = memory.empty(given.vertices.shape)
+
+        self._enter_frame(given.vertices, vertices)
+        made: Made = kernels.spots.Made(
+            kernels.patches.Surface(self._places, self.faces),
+            *(*self._links, self._held, self._first_normals, cos_turn),
+            new_boxes(len(self.faces)),
+        )
+        spots = Spots(made, Mesh(vertices, given.faces), vertex_map, self._crew)
+        spots.lower(self._sums[:, kernels.fit.MOST2])
 
     def turn_over(self, cos_turn: float) -> None:
         """Turn edges over by the samples that were taken last, after the vertices have moved."""

@@ -125,8 +125,8 @@ def simplify(
         for that it could break: no largest edge or error, no number for `normal_deviation`,
         ``intersections="prevent"`` or ``blocked="violate"``. Vertices on the boundary,
         locked ones, those on seams and, with `feature_angle`, on features stay where they are.
-        Edges between others may be turned over, without `face_data`: where no more than a 16th of
-        the faces is left and something is gained, and beside faces without height.
+        Edges between others may be turned over, without `face_data`: where something is gained,
+        unless the surface is smooth and many faces are left, and beside faces without height.
     locked : array_like, optional
         Vertices that may neither move nor vanish: a boolean mask of shape (n,), or indices.
     seams : array_like or str or sequence of str, optional

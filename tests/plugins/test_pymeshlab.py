@@ -257,11 +257,32 @@ def test_parameters_are_options_of_the_core(parameters, options):
     ms = MeshSet()
     ms.add_mesh(Mesh(vertices, faces))
     figures = ms.apply_filter(SIMPLIFY, targetfacenum=200, **parameters)
-    expected = tetsimplify.simplify(vertices, faces, target_faces=200, **options)
+    face_data = {"face": np.arange(len(faces))}  # with which no edge is turned over
+    expected = tetsimplify.simplify(
+        vertices, faces, target_faces=200, face_data=face_data, **options
+    )
     mesh = ms.current_mesh()
     new = triangles(mesh.vertex_matrix(), mesh.face_matrix())
     assert np.array_equal(new, triangles(expected.vertices, expected.faces))
     assert figures["stop"] == expected.report.stop
+
+
+@pytest.mark.parametrize("n_faces", [200, 20])
+def test_faces_in_place_are_what_contraction_leaves(n_faces):
+    """PyMeshLab keeps its faces: where edges are turned over they would be others."""
+    vertices, faces, _ = grid()
+    vertices[:, 2] = 0.1 * np.sin(5 * vertices[:, 0]) * np.cos(4 * vertices[:, 1])
+    ms = MeshSet()
+    ms.add_mesh(Mesh(vertices, faces))
+    ms.apply_filter(SIMPLIFY, targetfacenum=n_faces)
+    of_map, new, free = (
+        tetsimplify.simplify(vertices, faces, target_faces=n_faces, **options)
+        for options in ({"fit": False}, {"face_data": {"face": faces[:, 0]}}, {})
+    )
+    assert np.array_equal(of_map.faces, new.faces) and not np.array_equal(of_map.faces, free.faces)
+    mesh = ms.current_mesh()
+    in_place = triangles(mesh.vertex_matrix(), mesh.face_matrix())
+    assert np.array_equal(in_place, triangles(new.vertices, new.faces))
 
 
 # --- what a mesh carries -----------------------------------------------------------------------
