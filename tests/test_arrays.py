@@ -6,6 +6,7 @@ import pytest
 import meshes
 import tetsimplify
 from tetsimplify import arrays
+from tetsimplify.io import write_mesh
 
 CALLS = {
     "topology": lambda v, f: tetsimplify.topology(v, f),
@@ -91,3 +92,14 @@ def test_errors_also_are_the_standard_ones():
     missing = tetsimplify.MissingExtraError("reading NIfTI", "nibabel", "volumes")
     assert isinstance(missing, ImportError)
     assert str(missing) == 'reading NIfTI needs nibabel: pip install "tetsimplify[volumes]"'
+
+
+@pytest.mark.parametrize("data", [np.zeros((4, 3)), [1, 2, 3, 4], "normals"])
+def test_data_are_named(data, tmp_path):
+    vertices, faces = meshes.tetrahedron()
+    message = f"vertex_data must be a dict of arrays by name, got {type(data).__name__}"
+    with pytest.raises(tetsimplify.OptionError, match=message):
+        tetsimplify.simplify(vertices, faces, max_edge_length=1.0, vertex_data=data)
+    with pytest.raises(tetsimplify.OptionError, match=message):
+        write_mesh(tmp_path / "a.ply", (vertices, faces), data)
+    assert not list(tmp_path.iterdir())

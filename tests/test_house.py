@@ -92,13 +92,14 @@ def test_there_is_no_kernel_module_of_another_name():
 
 
 def test_kernels_run_in_python_too():
-    """The example of `simplify` without compilation, as one steps through it."""
+    """By length and by error without compilation, as one steps through it."""
     code = (
         "import tetsimplify, numpy as np\n"
         "x, y, z = np.mgrid[-1:1:7j, -1:1:7j, -1:1:7j]\n"
         "mesh = tetsimplify.extract_isosurface(0.8 - np.sqrt(x**2 + y**2 + z**2), 0.0)\n"
-        "result = tetsimplify.simplify(*mesh, max_edge_length=0.4)\n"
-        "print(len(mesh.faces), len(result.faces), result.faces.sum())\n"
+        "for options in ({'max_edge_length': 0.4}, {'target_faces': 60}, {'target_faces': 16}):\n"
+        "    result = tetsimplify.simplify(*mesh, **options)\n"
+        "    print(len(mesh.faces), len(result.faces), f'{np.abs(result.vertices).sum():.3f}')\n"
     )
     outputs = {
         subprocess.run(

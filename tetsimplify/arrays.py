@@ -140,6 +140,8 @@ def as_data(
     name: str, data: Mapping[str, ArrayLike] | None, n_elements: int
 ) -> dict[str, NDArray[Any]]:
     """Cast named arrays that have one row for each vertex or face."""
+    if not isinstance(data, Mapping | None):
+        raise OptionError(f"{name} must be a dict of arrays by name, got {type(data).__name__}")
     arrays = {key: np.asarray(values) for key, values in (data or {}).items()}
     for key, array in arrays.items():
         if array.ndim == 0 or len(array) != n_elements:

@@ -43,7 +43,7 @@ COS_TURN = 0.7  # of the largest angle by which a face may turn
 EXACT = 1e-9  # of the size of the mesh: a height that is as good as none
 FLAT = 1e-3  # of the edges around: the height of faces that are not to be pulled from what they fit
 LARGEST = 1e300  # size of a mesh, and one over it: beyond, nothing is moved
-REACH = 3.0  # in root mean squared heights: how far a vertex may go in a round
+REACH = 4.0  # in root mean squared heights: how far a vertex may go in a round
 LIFT = 0.8  # the same at right angles to the surface
 DOUBT = 6.0  # so many samples more, without height, are thought of for that
 HIGH = 5.0  # in root mean squared heights of all: what is high
@@ -75,6 +75,7 @@ class Plan(NamedTuple):
 LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly anything is gained
 FEW = 16.0  # where there are as many, there is time for more, and more to gain
 ROUGH = 0.005  # rms height of samples, in edges, from which on there is more to gain
+PLANE = 0.0003  # the same, below which it is nearly all planes, with triangles to turn over there
 LIGHT = Plan(
     per_face=3.5,
     least_stride=1,
@@ -86,7 +87,7 @@ LIGHT = Plan(
     eases=True,
     lowers=False,
 )
-MEDIUM = LIGHT._replace(per_face=8.0, rounds=2, flips=1, stiffness=0.0015)
+MEDIUM = LIGHT._replace(per_face=8.0, rounds=2, flips=1, stiffness=0.0007)
 THOROUGH = Plan(
     per_face=8.0,
     least_stride=4,
@@ -174,7 +175,7 @@ def fit_mesh(
     if cos_feature is not None:
         fit.hold_features(cos_feature)
     fit.take_samples(given, vertex_map, plan, 0)
-    if plan is LIGHT and fit.roughness > ROUGH:
+    if plan is LIGHT and not PLANE < fit.roughness < ROUGH:
         plan = MEDIUM
     for i in range(plan.rounds):
         if i:

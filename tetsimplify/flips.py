@@ -35,8 +35,8 @@ SHAPE = 0.5  # weight of the sum of 2 r/R, beside the change of the error: -1 to
 LEAST = 0.03  # gain
 LEAST_FLAT = 0.01  # 2 r/R that two faces in a plane must gain
 WORST = 0.3  # 2 r/R below which no triangle may become worse than the worse one was
-FEW = 5.0  # samples of both faces: with fewer nothing is known of the error
-DOUBT = 5.0  # with so many samples the change of the error counts by half
+FEW = 3.0  # samples of both faces: with fewer nothing is known of the error
+DOUBT = 3.0  # with so many samples the change of the error counts by half
 RISE = 2.0  # how many times the squared error may be what it was, for a better shape
 MOST_ROUNDS = 6  # in which edges of flat faces and of caps are turned over
 

@@ -122,7 +122,7 @@ def write_mesh(
     MissingExtraError
         When the format needs a package that is not installed.
     """
-    write_meshes([(path, mesh, vertex_data or {})])
+    write_meshes([(path, mesh, {} if vertex_data is None else vertex_data)])
 
 
 def write_meshes(
@@ -142,8 +142,8 @@ def write_meshes(
     """
     checked = []
     for path, mesh, vertex_data in meshes:
-        mesh_format = check_target(path, vertex_data)
         arrays = as_data("vertex_data", vertex_data, len(mesh[0]))
+        mesh_format = check_target(path, arrays)
         if NORMALS in arrays and arrays[NORMALS].shape[1:] != (3,):
             raise OptionError(f"normals must have shape (n, 3), got {arrays[NORMALS].shape}")
         checked.append((path, mesh_format, as_mesh(*mesh, finite=False), arrays))

@@ -166,7 +166,8 @@ def _scan(patches, v, x, y, z, search, least, nearest):
     distance2, bits, _, _ = search
     begin, end = np.uint64(patches.first[v]), np.uint64(patches.first[v + 1])
     while begin < end:
-        n = min(np.uint64(CHUNK), (end - begin + np.uint64(LANES - 1)) & np.uint64(-LANES))
+        whole = (end - begin + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)
+        n = min(np.uint64(CHUNK), whole)
         to = begin
         for i in range(n):
             dx = patches.middle[0, to] - x
