@@ -22,6 +22,7 @@ from tetsimplify.fit import (
     LIFT,
     LIGHT,
     MEDIUM,
+    PLANE,
     ROUGH,
     THOROUGH,
     Links,
@@ -337,6 +338,15 @@ def test_edges_are_turned_over_where_it_is_rough(noise):
     fit = started(mesh, before, LIGHT)
     assert (fit.roughness > ROUGH) == (noise > 0.0)
     assert (before.faces != after.faces).any() == (noise > 0.0)
+
+
+def test_triangles_of_planes_become_better():
+    mesh = cube(24)
+    before, after = contracted(mesh, keep_ratio=0.15), tetsimplify.simplify(*mesh, keep_ratio=0.15)
+    assert started(mesh, before, LIGHT).roughness < PLANE
+    assert mean_distance(mesh, *after[:2]) < 1e-9
+    shapes = [tetsimplify.quality(*result[:2]).radius_ratio.mean() for result in (before, after)]
+    assert shapes[1] > shapes[0] + 0.01
 
 
 def test_tips_do_not_stick_out(monkeypatch):
