@@ -59,6 +59,7 @@ CASES = (
     "gyroid",
     "dragon_vrip_full.ply",
     "igea.ply",
+    "skull_yj.ply",
     "cranium_invesalius.ply",
     "windbuildings.ply",
 )
