@@ -76,7 +76,7 @@ LEAST = 3.0  # faces given for one that is left: where there are fewer, hardly a
 FEW = 16.0  # where there are as many, there is time for more, and more to gain
 ROUGH = 0.005  # rms height of samples, in edges, from which on there is more to gain
 PLANE = 0.0003  # the same, below which it is nearly all planes, with triangles to turn over there
-LIGHT = Plan(
+LIGHT = Plan(  # for smooth surfaces of which many faces are left
     per_face=3.5,
     least_stride=1,
     rounds=1,
@@ -87,8 +87,9 @@ LIGHT = Plan(
     eases=True,
     lowers=False,
 )
+# for rough and plane ones, after a first round with the samples of the light plan
 MEDIUM = LIGHT._replace(per_face=8.0, rounds=2, flips=1, stiffness=0.0007)
-THOROUGH = Plan(
+THOROUGH = Plan(  # where few are left
     per_face=8.0,
     least_stride=4,
     rounds=3,
