@@ -15,7 +15,7 @@ from test_simplify import assert_same_topology
 from tetsimplify import kernels, spots
 from tetsimplify.arrays import as_mesh
 from tetsimplify.crew import Crew
-from tetsimplify.fit import COS_TURN
+from tetsimplify.fit import COS_TURN, EXACT
 from tetsimplify.kernels.boxes import IN_BOX, WIDTH
 from tetsimplify.mesh import Mesh
 from tetsimplify.spots import Spots, new_boxes
@@ -50,7 +50,7 @@ def measure_one_by_one(surface, points, out):
 
 
 distance2_to_face = kernels.nearest.distance2_to_face
-kernels_measure_exactly = kernels.spots._measure_exactly
+kernels_measure_exactly = kernels.lowering._measure_exactly
 kernels_near_face = kernels.patches.near_face
 kernels_nearest_face = kernels.patches.nearest_face
 kernels_nearest_of_all = kernels.patches.nearest_of_all
@@ -78,7 +78,7 @@ def spots_of(mesh, result, threads=1, **more):
 def lowered(mesh, result, **more):
     """The result with its worst spots lowered, without samples, and how many were."""
     of_result, made = spots_of(mesh, result, **more)
-    n = of_result.lower(np.zeros(len(result.faces), np.float32))
+    n = of_result.lower(np.zeros(len(result.faces), np.float32), EXACT)
     return result._replace(vertices=made.surface.vertices), n
 
 
@@ -187,10 +187,10 @@ def exactly(mesh, result, of_patches, known=0.0, least=0.0):
     """The largest distance of the points of each vertex, and of its patches."""
     of_result, made = spots_of(mesh, result)
     n, kernel = len(result.vertices), kernels.spots
-    candidates = kernel.Candidates(
+    candidates = kernels.lowering.Candidates(
         np.arange(n), np.full(n, np.inf), np.full(n, of_patches), np.empty(n)
     )
-    limits, desk = kernel.Limits(known**2, least, 0.0, 0), kernel.Desk.new(10**9)
+    limits, desk = kernels.lowering.Limits(known**2, least, 0.0, 0), kernel.Desk.new(10**9)
     measure_exactly(made, of_result._patches, candidates, limits, desk)
     return np.sqrt(candidates.exact2)
 
@@ -277,7 +277,7 @@ def test_a_peak_that_no_face_is_near_to_is_found_by_its_samples():
     of_result, made = spots_of(with_peak, result)
     before = largest(with_peak, result)
     assert before[1] > 0.02 > before[0]
-    assert of_result.lower(heights2) > 0
+    assert of_result.lower(heights2, EXACT) > 0
     after = largest(with_peak, result._replace(vertices=made.surface.vertices))
     assert max(after) < 0.9 * before[1]
 
@@ -304,7 +304,7 @@ def test_no_face_turns_farther_than_it_may():
 def test_boxes_keep_the_faces_that_move():
     mesh = CASES["gyroid"]()
     of_result, made = spots_of(mesh, contracted(mesh, keep_ratio=0.05))
-    assert of_result.lower(np.zeros(len(made.surface.faces), np.float32)) > 0
+    assert of_result.lower(np.zeros(len(made.surface.faces), np.float32), EXACT) > 0
     for f, corners in enumerate(made.surface.vertices[made.surface.faces]):
         box = made.boxes[f // (IN_BOX * WIDTH), :, f // IN_BOX % WIDTH]
         assert (corners >= box[:3]).all() and (corners <= box[3:]).all()

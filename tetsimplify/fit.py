@@ -147,12 +147,12 @@ def fit_mesh(
         The result does not depend on it.
     cos_turn : float
         Cosine of the largest angle by which a face may turn. It may not lose more than half of
-        its area either.
+        its area either, three quarters at the worst spots.
     cos_feature : float, optional
         Cosine of the angle from which on the vertices of an edge are held.
     flips : bool
-        Whether edges may be turned over: with many faces given for each that is left, where that
-        gains something, and else where faces have no height.
+        Whether edges may be turned over: where that gains something, unless the surface is smooth
+        and many faces are left, and where faces have no height.
     progress : callable, optional
         Called as ``progress("fit", done)``. Raise from it to cancel.
 
@@ -425,7 +425,6 @@ class _Fit:
         """Move vertices where the surfaces are farthest from each other."""
         assert self._first_normals is not None
         vertices = memory.empty(given.vertices.shape)
-
         self._enter_frame(given.vertices, vertices)
         made: Made = kernels.spots.Made(
             kernels.patches.Surface(self._places, self.faces),
@@ -433,7 +432,7 @@ class _Fit:
             new_boxes(len(self.faces)),
         )
         spots = Spots(made, Mesh(vertices, given.faces), vertex_map, self._crew)
-        spots.lower(self._sums[:, kernels.fit.MOST2])
+        spots.lower(self._sums[:, kernels.fit.MOST2], EXACT)
 
     def turn_over(self, cos_turn: float) -> None:
         """Turn edges over by the samples that were taken last, after the vertices have moved."""

@@ -4,7 +4,8 @@ Samples of the surface given tell where it is far from the faces that are left, 
 these is far from it: across a hollow the samples are near to its other faces. So points on all
 faces are measured, too, about at first, exactly where they may be among the worst. Then the corners
 of the face with the worst spot move, so that it comes nearer to the other surface, if everything
-around stays nearer than the spot was; then those of the next one. See kernels/spots.py.
+around stays nearer than the spot was; then those of the next one. See kernels/spots.py and
+kernels/lowering.py.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
-EXACT = 1e-9  # of the size of the mesh: a distance that is as good as none
 VERTICES = 2**10  # in a part
 PER_GIVEN = 6  # faces that are looked at for each one given, at most
 CANDIDATES = 2**7  # vertices that are measured exactly, at most
@@ -65,13 +65,15 @@ class Spots:
         kernel.find_boxes(self._patches)
         kernels.spots.find_boxes(made)
 
-    def lower(self, heights2: NDArray[np.float32]) -> int:
+    def lower(self, heights2: NDArray[np.float32], exact: float) -> int:
         """Lower the worst ones; return how many times one was.
 
         Parameters
         ----------
         heights2 : ndarray, shape (m,), float32
             The largest squared height of the samples of each face.
+        exact : float
+            A distance that is as good as none.
         """
         kernel, n = kernels.spots, len(self._made.surface.vertices)
         far2 = memory.empty(n)
@@ -91,12 +93,14 @@ class Spots:
         n_candidates = min(CANDIDATES, n)
         worst = np.argpartition(-far2, n_candidates - 1)[:n_candidates]
         worst = worst[np.lexsort((worst, -far2[worst]))]
-        candidates = kernel.Candidates(
+        candidates = kernels.lowering.Candidates(
             worst, far2[worst], of_patches[worst], np.empty(n_candidates)
         )
-        limits = kernel.Limits(0.5 * most_heights2, LEAST, EXACT**2, TRIES)
+        limits = kernels.lowering.Limits(0.5 * most_heights2, LEAST, exact**2, TRIES)
         desk = kernel.Desk.new(PER_GIVEN * len(self._patches.given.faces))
-        return int(kernel.lower_spots(self._made, self._patches, candidates, limits, desk))
+        return int(
+            kernels.lowering.lower_spots(self._made, self._patches, candidates, limits, desk)
+        )
 
 
 def new_boxes(n: int) -> Array:

@@ -18,10 +18,10 @@ from tetsimplify.kernels import boxes
 from tetsimplify.kernels.boxes import IN_BOX, PER_FACE, WIDTH
 from tetsimplify.kernels.jit import cold_part, kernel_in_place, part
 from tetsimplify.kernels.nearest import distance2_to_face
+from tetsimplify.kernels.samples import FAR
 
 LANES = 32  # middles that are compared together
 CHUNK = 64  # of which the numbers stand in the last bits
-FAR = np.int32(0x7149F2CA)  # the bits of 1e30: of floats that are not negative they are in order
 ROUNDED = 1.0 + 1e-4  # by which lengths in float32 may be wrong, and more
 THIRD = 1.0 / 3.0
 
